@@ -1,0 +1,19 @@
+# loopbit_part(NAME HEADERS ... SOURCES ... LINKS ... PRIVATE_LINKS ...)
+#
+# A part of the library: sources of its own, public headers in include/loopbit/, and the parts it may
+# know. A part that does not name another in LINKS cannot include its headers, which is how the
+# include direction is held. All parts of one library are shipped as that one library.
+function(loopbit_part name)
+  cmake_parse_arguments(PART "" "" "HEADERS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  set(target loopbit_${name})
+  add_library(${target} OBJECT ${PART_SOURCES})
+  target_include_directories(
+    ${target} PUBLIC $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>)
+  target_link_libraries(
+    ${target}
+    PUBLIC ${PART_LINKS}
+    PRIVATE ${PART_PRIVATE_LINKS} loopbit_warnings)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  list(TRANSFORM PART_HEADERS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/include/)
+  install(FILES ${PART_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbit)
+endfunction()

@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""Runs clang-tidy over every source of ours in a finished build.
+
+A source is skipped while all that decides its result is as it was when it last passed: its
+command, the .clang-tidy file, clang-tidy itself, and the content of each of our files it includes
+(as the compiler reported them to Ninja).
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import pathlib
+import shlex
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+TIDY = "clang-tidy-14"
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+
+
+def included_files(build):
+    """The files each object was compiled from, by object."""
+    listing = subprocess.run(
+        ["ninja", "-C", build, "-t", "deps"], check=True, capture_output=True, text=True
+    ).stdout
+    files, current = {}, []
+    for line in listing.splitlines():
+        if line.startswith(" "):
+            current.append((build / line.strip()).resolve())
+        elif line:
+            current = files[line.split(": #deps ")[0]] = []
+    return files
+
+
+def is_ours(file):
+    return file.is_relative_to(ROOT)
+
+
+def fingerprint(entry, files, common):
+    digest = hashlib.sha256(common + entry["command"].encode())
+    for file in sorted(filter(is_ours, files)):
+        digest.update(str(file.relative_to(ROOT)).encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()
+
+
+def check(source, build, stamp):
+    """What clang-tidy found in a source, or nothing, which the stamp then remembers."""
+    result = subprocess.run(
+        [TIDY, "--quiet", "-p", build, source], capture_output=True, text=True
+    )
+    if result.returncode == 0:
+        stamp.touch()
+        return ""
+    return result.stdout or result.stderr or f"{source}: exit code {result.returncode}\n"
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("build", type=pathlib.Path, help="folder of a finished Ninja build")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    arguments = parser.parse_args()
+    build = arguments.build.resolve()
+
+    version = subprocess.run([TIDY, "--version"], check=True, capture_output=True).stdout
+    common = version + (ROOT / ".clang-tidy").read_bytes()
+    files = included_files(build)
+    stamps = build / "tidy"
+    stamps.mkdir(exist_ok=True)
+
+    todo, passed = {}, set()
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        source = pathlib.Path(entry["file"])
+        if not is_ours(source) or source.is_relative_to(build):
+            continue
+        command = shlex.split(entry["command"])
+        output = command[command.index("-o") + 1]
+        if output not in files:
+            sys.exit(f"tidy.py: {source} is not compiled yet; build {build} first.")
+        stamp = stamps / fingerprint(entry, files[output], common)
+        if stamp.exists():
+            passed.add(stamp)
+        else:
+            todo[source] = stamp
+    for stale in set(stamps.iterdir()) - passed:
+        stale.unlink()
+
+    with ThreadPoolExecutor(arguments.jobs) as pool:
+        findings = list(pool.map(lambda item: check(item[0], build, item[1]), todo.items()))
+    print("".join(findings), end="")
+    failed = sum(map(bool, findings))
+    print(f"clang-tidy: {len(passed)} unchanged, {len(todo) - failed} passed, {failed} failed")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
