@@ -1,0 +1,58 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+
+namespace loopbit {
+
+/// One setting of an options struct: its name, where it lives, the values it may take (both ends
+/// included) and one line that says what it means. Every options struct lists its settings in
+/// `static constexpr auto fields()`; validation, the configuration file, the command line and its
+/// help all read that list, and defaults stand nowhere but in the struct.
+template <typename Struct, typename Value>
+struct Field {
+  static_assert(std::is_same_v<Value, int> || std::is_same_v<Value, double> ||
+                std::is_same_v<Value, bool>);
+
+  std::string_view name;
+  Value Struct::*member;
+  Value min;
+  Value max;
+  std::string_view help;
+};
+
+template <typename Struct, typename Value>
+Field(const char*, Value Struct::*, std::type_identity_t<Value>, std::type_identity_t<Value>,
+      const char*) -> Field<Struct, Value>;
+
+/// A switch: false or true.
+template <typename Struct>
+constexpr Field<Struct, bool> switch_field(std::string_view name, bool Struct::*member,
+                                           std::string_view help) {
+  return {name, member, false, true, help};
+}
+
+/// Calls visit(field) for each field of Struct, in the order of declaration.
+template <typename Struct, typename Visit>
+void for_each_field(Visit&& visit) {
+  std::apply([&](const auto&... field) { (visit(field), ...); }, Struct::fields());
+}
+
+/// Throws Error (kind option) that says `section.name is value, but must be between min and max`.
+void check_range(std::string_view section, std::string_view name, double value, double min,
+                 double max);
+
+/// Throws Error for the first field of `options` that lies outside its range (NaN does).
+template <typename Struct>
+void validate(const Struct& options, std::string_view section) {
+  for_each_field<Struct>([&](const auto& field) {
+    check_range(section, field.name, static_cast<double>(options.*field.member),
+                static_cast<double>(field.min), static_cast<double>(field.max));
+  });
+}
+
+}  // namespace loopbit

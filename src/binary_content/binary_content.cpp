@@ -1,0 +1,171 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/binary_content.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <opencv2/imgproc.hpp>
+
+namespace loopbit {
+namespace {
+
+/// A frequency whose amplitude is below this (in grey levels summed over the 64 x 64 map) is
+/// rounding noise, not structure: it has no phase worth keeping.
+constexpr float kNoiseAmplitude = 1.0F;
+
+cv::Mat1f resize_to_map(const cv::Mat1b& gray) {
+  const bool shrinks = gray.cols >= kContentSide && gray.rows >= kContentSide;
+  cv::Mat small;
+  cv::resize(gray, small, {kContentSide, kContentSide}, 0, 0,
+             shrinks ? cv::INTER_AREA : cv::INTER_LINEAR_EXACT);
+  cv::Mat1f map;
+  small.convertTo(map, CV_32F);
+  return map;
+}
+
+/// Plain loops in a fixed order, because OpenCV's filters round differently from one instruction
+/// set to the next, and the bits may not.
+cv::Mat1f filter_columns_then_transpose(const cv::Mat1f& padded, const std::vector<float>& kernel) {
+  const int taps = static_cast<int>(kernel.size());
+  cv::Mat1f transposed(padded.cols, padded.rows - taps + 1);
+  std::vector<float> sums(static_cast<std::size_t>(padded.cols));
+  for (int y = 0; y < transposed.cols; ++y) {
+    std::fill(sums.begin(), sums.end(), 0.0F);
+    for (int k = 0; k < taps; ++k) {
+      const float* row = padded[y + k];
+      const float weight = kernel[static_cast<std::size_t>(k)];
+      for (std::size_t x = 0; x < sums.size(); ++x) sums[x] += weight * row[x];
+    }
+    for (int x = 0; x < transposed.rows; ++x) transposed(x, y) = sums[static_cast<std::size_t>(x)];
+  }
+  return transposed;
+}
+
+cv::Mat1f separable_filter(const cv::Mat1f& map, const std::vector<float>& kernel, int border) {
+  const int radius = static_cast<int>(kernel.size()) / 2;
+  cv::Mat1f padded;
+  cv::copyMakeBorder(map, padded, radius, radius, radius, radius, border);
+  return filter_columns_then_transpose(filter_columns_then_transpose(padded, kernel), kernel);
+}
+
+std::vector<float> box_kernel(int radius) {
+  const int side = 2 * radius + 1;
+  return std::vector<float>(static_cast<std::size_t>(side), 1.0F / static_cast<float>(side));
+}
+
+std::vector<float> gaussian_kernel(double sigma) {
+  const int radius = static_cast<int>(std::ceil(3 * sigma));
+  std::vector<double> weights;
+  double sum = 0;
+  for (int i = -radius; i <= radius; ++i) {
+    weights.push_back(std::exp(-i * i / (2 * sigma * sigma)));
+    sum += weights.back();
+  }
+  std::vector<float> kernel;
+  for (const double weight : weights) kernel.push_back(static_cast<float>(weight / sum));
+  return kernel;
+}
+
+cv::Mat1f log_amplitude(const cv::Mat2f& spectrum) {
+  cv::Mat1f log_amplitude(spectrum.size());
+  std::transform(spectrum.begin(), spectrum.end(), log_amplitude.begin(), [](const cv::Vec2f& f) {
+    return std::log(std::max(std::sqrt(f[0] * f[0] + f[1] * f[1]), kNoiseAmplitude));
+  });
+  return log_amplitude;
+}
+
+/// exp(R + iP) with R = L - box(L). As exp(L + iP) is the spectrum F itself, this is F /
+/// exp(box(L)): no phase has to be computed.
+cv::Mat2f residual_spectrum(const cv::Mat2f& spectrum, int radius) {
+  const cv::Mat1f average =
+      separable_filter(log_amplitude(spectrum), box_kernel(radius), cv::BORDER_WRAP);
+  cv::Mat2f residual(spectrum.size());
+  std::transform(spectrum.begin(), spectrum.end(), average.begin(), residual.begin(),
+                 [](const cv::Vec2f& f, float mean_log) -> cv::Vec2f {
+                   const float amplitude_sq = f[0] * f[0] + f[1] * f[1];
+                   if (amplitude_sq < kNoiseAmplitude * kNoiseAmplitude) return {0.0F, 0.0F};
+                   return f * std::exp(-mean_log);
+                 });
+  return residual;
+}
+
+cv::Mat1f squared_magnitude(const cv::Mat2f& map) {
+  cv::Mat1f magnitude(map.size());
+  std::transform(map.begin(), map.end(), magnitude.begin(),
+                 [](const cv::Vec2f& f) { return f[0] * f[0] + f[1] * f[1]; });
+  return magnitude;
+}
+
+}  // namespace
+
+int count(const BinaryContent& content) {
+  int set = 0;
+  for (const std::uint64_t row : content.rows) set += std::popcount(row);
+  return set;
+}
+
+cv::Point2d center(const BinaryContent& content) {
+  std::int64_t sum_x = 0;
+  std::int64_t sum_y = 0;
+  std::int64_t set = 0;
+  for (int y = 0; y < kContentSide; ++y) {
+    const std::uint64_t row = content.rows[static_cast<std::size_t>(y)];
+    set += std::popcount(row);
+    sum_y += std::int64_t{y} * std::popcount(row);
+    for (std::uint64_t bits = row; bits != 0; bits &= bits - 1) sum_x += std::countr_zero(bits);
+  }
+  if (set == 0) return {(kContentSide - 1) / 2.0, (kContentSide - 1) / 2.0};
+  const auto n = static_cast<double>(set);
+  return {static_cast<double>(sum_x) / n, static_cast<double>(sum_y) / n};
+}
+
+BinaryContent shift_columns(const BinaryContent& content, int columns) {
+  if (std::abs(columns) >= kContentSide) return {};
+  BinaryContent shifted;
+  std::transform(
+      content.rows.begin(), content.rows.end(), shifted.rows.begin(),
+      [&](std::uint64_t row) { return columns >= 0 ? row << columns : row >> -columns; });
+  return shifted;
+}
+
+double similarity(const BinaryContent& a, const BinaryContent& b) {
+  int overlap = 0;
+  for (std::size_t y = 0; y < a.rows.size(); ++y) overlap += std::popcount(a.rows[y] & b.rows[y]);
+  const int larger = std::max(count(a), count(b));
+  return larger == 0 ? 0.0 : static_cast<double>(overlap) / larger;
+}
+
+cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options) {
+  validate(options, "binary_content");
+  cv::Mat2f spectrum;
+  cv::dft(resize_to_map(gray), spectrum, cv::DFT_COMPLEX_OUTPUT);
+  cv::Mat2f residual = residual_spectrum(spectrum, options.residual_radius_px);
+  cv::Mat2f map;
+  cv::dft(residual, map, cv::DFT_INVERSE | cv::DFT_SCALE);
+  return separable_filter(squared_magnitude(map), gaussian_kernel(options.blur_sigma_px),
+                          cv::BORDER_REFLECT_101);
+}
+
+BinaryContent binarize(const cv::Mat1f& saliency, double gamma) {
+  CV_Assert(saliency.rows == kContentSide && saliency.cols == kContentSide);
+  double sum = 0;
+  for (const float value : saliency) sum += value;
+  const double threshold = gamma * sum / static_cast<double>(saliency.total());
+  BinaryContent content;
+  for (int y = 0; y < kContentSide; ++y) {
+    for (int x = 0; x < kContentSide; ++x) {
+      if (saliency(y, x) > threshold) {
+        content.rows[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x;
+      }
+    }
+  }
+  return content;
+}
+
+BinaryContent binary_content(const cv::Mat1b& gray, const BinaryContentOptions& options) {
+  return binarize(saliency_map(gray, options), options.gamma);
+}
+
+}  // namespace loopbit

@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <tuple>
+
+#include <opencv2/core.hpp>
+
+#include "loopbit/options.hpp"
+
+namespace loopbit {
+
+/// Side of the saliency map and of the binary content, in pixels.
+inline constexpr int kContentSide = 64;
+
+/// The 64 x 64 bits an image is recognised by. Row y is rows[y], column x is its bit x (bit 0 is
+/// the left edge), so shifting the image sideways is a shift of 64 words.
+struct BinaryContent {
+  alignas(64) std::array<std::uint64_t, kContentSide> rows{};
+
+  bool operator==(const BinaryContent&) const = default;
+};
+
+/// |O|: the number of set pixels, 0 to 4096.
+[[nodiscard]] int count(const BinaryContent& content);
+
+/// M(O): the mean coordinate of the set pixels, x right and y down, each in [0, 63]. The middle of
+/// the map (31.5, 31.5) if none is set.
+[[nodiscard]] cv::Point2d center(const BinaryContent& content);
+
+/// The content moved `columns` to the right (left if negative); what leaves the map is lost.
+[[nodiscard]] BinaryContent shift_columns(const BinaryContent& content, int columns);
+
+/// xi(O1, O2) = |O1 & O2| / max(|O1|, |O2|), in [0, 1]; 0 if either is empty.
+[[nodiscard]] double similarity(const BinaryContent& a, const BinaryContent& b);
+
+struct BinaryContentOptions {
+  double gamma = 1.5;
+  double blur_sigma_px = 2.5;
+  int residual_radius_px = 1;
+
+  static constexpr auto fields() {
+    using S = BinaryContentOptions;
+    return std::tuple{
+        Field{"gamma", &S::gamma, 1.1, 16.0,
+              "a pixel is set where its saliency exceeds gamma times the mean; larger keeps fewer"},
+        Field{"blur_sigma_px", &S::blur_sigma_px, 0.5, 8.0,
+              "standard deviation of the Gaussian over the 64 x 64 saliency map, pixels"},
+        Field{"residual_radius_px", &S::residual_radius_px, 1, 7,
+              "the log amplitude spectrum is averaged over a box of 2 * radius + 1 pixels a side"}};
+  }
+};
+
+/// The spectral residual saliency map S of `gray`, 64 x 64, not normalised.
+///
+/// `gray`: 8 bits, at least 32 x 32. Hou and Zhang, "Saliency Detection: A Spectral Residual
+/// Approach", CVPR 2007, eq. 3 to 6; Wang et al. 2019, section III-A. Values are >= 0, and constant
+/// where the image is flat. About 0.2 ms.
+cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options = {});
+
+/// The pixels whose saliency exceeds gamma times the mean. An image without contrast has none.
+/// Wang et al. 2019, section III-A.
+BinaryContent binarize(const cv::Mat1f& saliency, double gamma);
+
+/// binarize(saliency_map(gray)): step 1 of the method.
+BinaryContent binary_content(const cv::Mat1b& gray, const BinaryContentOptions& options = {});
+
+}  // namespace loopbit

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace loopbit {
+
+/// Images narrower or lower than this hold too little to recognise a place by.
+inline constexpr int kMinImageSidePx = 32;
+
+/// The 8-bit grey picture of any camera image, which all parts work on.
+///
+/// `image`: 8- or 16-bit unsigned, grey, BGR or BGRA, at least 32 x 32. 16-bit images are stretched
+/// so that their darkest and brightest thousandth meet 0 and 255: a 12-bit camera or a thermal one
+/// uses a small part of the 16 bits. An 8-bit grey image is returned as it is, without a copy.
+/// Throws Error (kind input) that names what was found, for anything else.
+cv::Mat1b gray_image(const cv::Mat& image);
+
+}  // namespace loopbit

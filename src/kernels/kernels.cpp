@@ -1,0 +1,58 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/kernels.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+#include "kernel_variants.hpp"
+
+namespace loopbit {
+namespace {
+
+std::vector<const Kernels*> kernels_of_this_processor() {
+  std::vector<const Kernels*> kernels{&kScalarKernels};
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx2") != 0) kernels.push_back(&kAvx2Kernels);
+  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
+      __builtin_cpu_supports("avx512vpopcntdq") != 0) {
+    kernels.push_back(&kAvx512Kernels);
+  }
+#endif
+  return kernels;
+}
+
+const Kernels& choose() {
+  const auto kernels = available_kernels();
+  const char* forced = std::getenv("LOOPBIT_KERNEL");
+  if (forced == nullptr) return *kernels.back();
+  const auto found =
+      std::find_if(kernels.begin(), kernels.end(), [&](auto* k) { return k->name == forced; });
+  if (found != kernels.end()) return **found;
+  std::string names;
+  for (const Kernels* kernel : kernels) names += fmt::format(" {}", kernel->name);
+  throw Error(ErrorKind::option,
+              fmt::format("LOOPBIT_KERNEL is '{}', which this processor cannot run; unset it or "
+                          "take one of:{}.",
+                          forced, names));
+}
+
+}  // namespace
+
+std::span<const Kernels* const> available_kernels() {
+  static const std::vector<const Kernels*> kernels = kernels_of_this_processor();
+  return kernels;
+}
+
+const Kernels& active_kernels() {
+  static const Kernels& kernels = choose();
+  return kernels;
+}
+
+}  // namespace loopbit

@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <tuple>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "loopbit/options.hpp"
+#include "loopbit/surf.hpp"
+
+namespace loopbit {
+
+/// Two features taken for the same point of the world.
+struct Match {
+  int query = 0;  ///< index into the query's features
+  int place = 0;  ///< index into the place's features
+
+  bool operator==(const Match&) const = default;
+};
+
+struct VerificationOptions {
+  double max_ratio = 0.8;
+  int min_matches = 8;
+  double max_epipolar_error_px = 2.0;
+
+  static constexpr auto fields() {
+    using S = VerificationOptions;
+    return std::tuple{
+        Field{"max_ratio", &S::max_ratio, 0.1, 1.0,
+              "a match is kept if its distance is at most this part of the second best"},
+        Field{"min_matches", &S::min_matches, 8, 1000, "with fewer matches no geometry is sought"},
+        Field{"max_epipolar_error_px", &S::max_epipolar_error_px, 0.1, 50.0,
+              "an inlier lies at most this far from its epipolar line, working pixels"}};
+  }
+};
+
+/// What the geometry of two images says about them showing one place.
+struct Verification {
+  std::vector<Match> matches;  ///< one to one
+  std::vector<Match> inliers;  ///< those that one epipolar geometry explains
+};
+
+/// Mutual best matches by the distance of descriptors that pass the ratio test from either side;
+/// only features with the same sign of the Laplacian are compared. Each feature is in one match at
+/// most: one-way matches gather on few points and fake inliers. Ties go to the lower index. A
+/// feature that has nothing to be second to is distinct. Cost: half of query times place features.
+std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio);
+
+/// The largest set of `matches` found that one fundamental matrix explains, by RANSAC with a fixed
+/// seed; empty below 8 matches, as 7 always fit. The same input gives the same inliers.
+std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
+                                    const std::vector<Match>& matches, double max_error_px);
+
+/// Step 3 for one candidate: match_features, then epipolar_inliers.
+Verification verify(const Features& query, const Features& place,
+                    const VerificationOptions& options = {});
+
+}  // namespace loopbit
