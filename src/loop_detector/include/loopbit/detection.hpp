@@ -1,0 +1,48 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "loopbit/place_index.hpp"
+
+namespace loopbit {
+
+/// Why a frame is a loop, or why not.
+enum class Status {
+  loop,              ///< the match is accepted: the camera has been at this place before
+  no_earlier_place,  ///< every place so far is too recent to be a candidate
+  no_similar_place,  ///< no earlier place looks alike: no candidate
+  few_matches,       ///< candidates, but none shares enough features with the query
+  no_geometry,       ///< features are shared, but no epipolar geometry explains enough of them
+  low_score,         ///< a geometry, but too little evidence to accept the match
+  unreadable,        ///< there was no usable image
+};
+
+/// "loop", "no_earlier_place", ...: the enumerator's name, as it stands in loops.csv.
+std::string_view to_string(Status status);
+
+/// Wall time of the steps of one detection, in milliseconds.
+struct StepTimes {
+  double content_ms = 0;       ///< step 1, binary content, with conversion to grey
+  double retrieval_ms = 0;     ///< step 2, fast image retrieval
+  double features_ms = 0;      ///< step 3, SURF
+  double verification_ms = 0;  ///< step 3, matching, geometry and decision
+};
+
+/// The answer for one frame, with the numbers behind it.
+struct Detection {
+  PlaceId frame = 0;  ///< number of the frame, from 0; also its place, if it was added
+  std::optional<double> timestamp_s = std::nullopt;
+  Status status = Status::no_earlier_place;
+  std::optional<PlaceId> match =
+      std::nullopt;       ///< the best candidate, accepted or not; none without candidates
+  double score = 0;       ///< what was compared with decision.min_score
+  double similarity = 0;  ///< xi of query and match
+  int matches = 0;        ///< features shared by query and match, one to one
+  int inliers = 0;        ///< those that one epipolar geometry explains
+  StepTimes times = {};
+};
+
+}  // namespace loopbit

@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "loopbit/binary_content.hpp"
+#include "loopbit/options.hpp"
+#include "loopbit/place_index.hpp"
+#include "loopbit/surf.hpp"
+#include "loopbit/verification.hpp"
+
+namespace loopbit {
+
+/// Which of the latest frames are too recent to be candidates. With `frames` and `seconds` both 0,
+/// recent is what the camera has had in view until now without a break, and as much again: this
+/// needs no setting for walked, driven or hand-held cameras at any frame rate, or for one that
+/// stands still.
+struct ExclusionOptions {
+  int min_frames = 10;
+  int frames = 0;
+  double seconds = 0.0;
+  int in_view_inliers = 12;
+
+  static constexpr auto fields() {
+    using S = ExclusionOptions;
+    return std::tuple{
+        Field{"min_frames", &S::min_frames, 1, 1'000'000,
+              "the latest frames that are never candidates, whatever else holds"},
+        Field{"frames", &S::frames, 0, 1'000'000'000,
+              "fixed window in frames in place of the automatic one; 0 = not fixed"},
+        Field{"seconds", &S::seconds, 0.0, 1e9,
+              "fixed window in seconds in place of the automatic one; 0 = not fixed"},
+        Field{"in_view_inliers", &S::in_view_inliers, 8, 1000,
+              "automatic window: a frame is still in view if it shares so many inliers"}};
+  }
+};
+
+/// The one rule that accepts a match: score >= min_score.
+struct DecisionOptions {
+  double min_score = 20.0;
+  int agreement_frames = 2;
+  double agreement_weight = 0.5;
+  int chance_inliers = 8;
+
+  static constexpr auto fields() {
+    using S = DecisionOptions;
+    return std::tuple{
+        Field{"min_score", &S::min_score, 0.0, 1e9, "smallest score of an accepted match"},
+        Field{"agreement_frames", &S::agreement_frames, 0, 100,
+              "frames just before the query that can support its match; 0 = each frame on its own"},
+        Field{"agreement_weight", &S::agreement_weight, 0.0, 1.0,
+              "what a supporting frame's inlier adds to the score; one of the query's adds 1"},
+        Field{"chance_inliers", &S::chance_inliers, 0, 100,
+              "inliers that images of different places share by chance; fewer support nothing"}};
+  }
+};
+
+/// Every setting of a LoopDetector. The defaults are meant for all data.
+struct LoopDetectorOptions {
+  BinaryContentOptions binary_content;
+  RetrievalOptions retrieval;
+  SurfOptions surf;
+  VerificationOptions verification;
+  ExclusionOptions exclusion;
+  DecisionOptions decision;
+};
+
+/// Calls visit(name, part) for each part of `options` (const or not), in order.
+template <typename Options, typename Visit>
+void for_each_section(Options& options, Visit&& visit) {
+  visit("binary_content", options.binary_content);
+  visit("retrieval", options.retrieval);
+  visit("surf", options.surf);
+  visit("verification", options.verification);
+  visit("exclusion", options.exclusion);
+  visit("decision", options.decision);
+}
+
+/// Throws Error for the first setting out of its range, and where two settings contradict.
+void validate(const LoopDetectorOptions& options);
+
+/// Sets one setting by its full name, as in set_option(options, "surf.max_keypoints", "500").
+/// Throws Error (kind option) for an unknown name, or a value of the wrong type or out of range.
+void set_option(LoopDetectorOptions& options, const std::string& name, const std::string& value);
+
+/// The settings as JSON text: an object a section, a number or truth value a setting.
+std::string to_json(const LoopDetectorOptions& options);
+
+/// The defaults changed by what `json` names; `//` comments are allowed. `source` (a file name) is
+/// named in errors. Throws Error (kind option) for bad syntax, unknown names and bad values.
+LoopDetectorOptions options_from_json(const std::string& json, const std::string& source);
+
+/// options_from_json of a file. Throws Error (kind input) if it cannot be read.
+LoopDetectorOptions load_options(const std::string& path);
+
+/// One setting, for help texts and tables.
+struct OptionInfo {
+  std::string name;           ///< "section.field"
+  std::string default_value;  ///< as set_option would take it
+  std::string range;          ///< "0.1 to 50", or "true or false"
+  std::string help;
+};
+
+/// All settings in order.
+std::vector<OptionInfo> list_options();
+
+}  // namespace loopbit

@@ -1,0 +1,236 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/loop_detector.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/gray_image.hpp"
+
+#include "agreement.hpp"
+#include "recent_view.hpp"
+
+namespace loopbit {
+namespace {
+
+/// Two frames this alike show the same view: the camera has hardly moved in between.
+constexpr double kUnmovedSimilarity = 0.8;
+
+class Stopwatch {
+ public:
+  double lap_ms() {
+    const auto now = Clock::now();
+    const std::chrono::duration<double, std::milli> lap = now - std::exchange(start_, now);
+    return lap.count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+Status reason_of_rejection(const VerifiedCandidate& best, const VerificationOptions& options) {
+  if (best.matches < options.min_matches) return Status::few_matches;
+  return best.inliers == 0 ? Status::no_geometry : Status::low_score;
+}
+
+}  // namespace
+
+class LoopDetector::Impl {
+ public:
+  explicit Impl(const LoopDetectorOptions& options)
+      : options_(options), agreement_(options.decision) {
+    validate(options);
+  }
+
+  /// One frame as the detector sees it: all that remember() needs.
+  struct Observation {
+    BinaryContent content;
+    Features features;
+    RecentView::Look look;
+    std::vector<VerifiedCandidate> verified;
+  };
+
+  /// The algorithm of Wang et al. 2019, section III.
+  Detection detect(const cv::Mat& image, std::optional<double> timestamp_s,
+                   Observation& seen) const {
+    check_time(timestamp_s);
+    Detection detection{.frame = index_.size(), .timestamp_s = timestamp_s};
+    Stopwatch stopwatch;
+
+    // Step 1: what the image is recognised by.
+    const cv::Mat1b gray = gray_image(image);
+    seen.content = binary_content(gray, options_.binary_content);
+    detection.times.content_ms = stopwatch.lap_ms();
+
+    // Step 3 begins: features. They also tell how far back the present view reaches.
+    seen.features = extract_surf(gray, options_.surf);
+    detection.times.features_ms = stopwatch.lap_ms();
+    const PlaceId end = first_recent_place(seen, timestamp_s);
+    detection.times.verification_ms = stopwatch.lap_ms();
+
+    // Step 2: the earlier places that look alike.
+    const auto candidates = index_.query(seen.content, end, options_.retrieval);
+    detection.times.retrieval_ms = stopwatch.lap_ms();
+
+    // Step 3: the one that geometry and the frames before agree on.
+    for (const Candidate& candidate : candidates) {
+      seen.verified.push_back(verified(seen.features, candidate));
+    }
+    decide(seen, end, detection);
+    detection.times.verification_ms += stopwatch.lap_ms();
+    return detection;
+  }
+
+  void remember(Observation seen, std::optional<double> timestamp_s) {
+    const PlaceId place = add_place(seen.content, std::move(seen.features), timestamp_s);
+    recent_view_.remember(place, seen.look);
+    agreement_.remember(std::move(seen.verified));
+  }
+
+  PlaceId skip(std::optional<double> timestamp_s) {
+    check_time(timestamp_s);
+    agreement_.remember({});
+    return add_place(BinaryContent{}, Features{}, timestamp_s);
+  }
+
+  [[nodiscard]] PlaceId size() const { return index_.size(); }
+  [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
+
+ private:
+  [[nodiscard]] const Features& features(PlaceId place) const {
+    return features_[static_cast<std::size_t>(place)];
+  }
+
+  void check_time(std::optional<double> timestamp_s) const {
+    if (options_.exclusion.seconds <= 0) return;
+    if (!timestamp_s) {
+      throw Error(ErrorKind::input,
+                  fmt::format("Frame {} has no timestamp, but exclusion.seconds is {}; give times, "
+                              "or set exclusion.frames in its place.",
+                              size(), options_.exclusion.seconds));
+    }
+    if (!times_s_.empty() && !(*timestamp_s >= times_s_.back())) {
+      throw Error(ErrorKind::input,
+                  fmt::format("Frame {} has timestamp {} s, before the last one of {} s; give the "
+                              "frames in order of time.",
+                              size(), *timestamp_s, times_s_.back()));
+    }
+  }
+
+  PlaceId add_place(const BinaryContent& content, Features features,
+                    std::optional<double> timestamp_s) {
+    features_.push_back(std::move(features));
+    times_s_.push_back(timestamp_s.value_or(0.0));
+    return index_.add(content);
+  }
+
+  [[nodiscard]] VerifiedCandidate verified(const Features& query,
+                                           const Candidate& candidate) const {
+    const Verification result = verify(query, features(candidate.place), options_.verification);
+    return {candidate, static_cast<int>(result.matches.size()),
+            static_cast<int>(result.inliers.size())};
+  }
+
+  /// The end of the places that may be candidates; notes in `seen` how far back the view reaches.
+  [[nodiscard]] PlaceId first_recent_place(Observation& seen,
+                                           std::optional<double> timestamp_s) const {
+    const ExclusionOptions& exclusion = options_.exclusion;
+    const PlaceId latest = std::max(0, size() - exclusion.min_frames);
+    if (exclusion.frames > 0) return std::min(latest, std::max(0, size() - exclusion.frames));
+    if (exclusion.seconds > 0) {
+      const auto recent =
+          std::upper_bound(times_s_.begin(), times_s_.end(), *timestamp_s - exclusion.seconds);
+      return std::min(latest, static_cast<PlaceId>(recent - times_s_.begin()));
+    }
+    const bool moved =
+        recent_view_.empty() ||
+        similarity(seen.content, index_.content(recent_view_.latest_step())) < kUnmovedSimilarity;
+    seen.look = recent_view_.look(size(), moved, [&](PlaceId place) {
+      return verified(seen.features, {place, 0}).inliers >= exclusion.in_view_inliers;
+    });
+    return std::min(latest, seen.look.begin);
+  }
+
+  [[nodiscard]] bool is_better(const VerifiedCandidate& a, const VerifiedCandidate& b) const {
+    const auto rank = [&](const VerifiedCandidate& v) {
+      return std::tuple(agreement_.score(v), v.matches, v.candidate.similarity);
+    };
+    return rank(a) > rank(b);
+  }
+
+  /// Candidates stand apart; the best place of all may be a neighbour of one. Verifies those of an
+  /// acceptable match.
+  [[nodiscard]] VerifiedCandidate refined(VerifiedCandidate best, const Observation& seen,
+                                          PlaceId end) const {
+    const PlaceId middle = best.candidate.place;
+    const int radius = options_.retrieval.min_spacing - 1;
+    for (PlaceId place = std::max(0, middle - radius); place <= std::min(end - 1, middle + radius);
+         ++place) {
+      if (place == middle) continue;
+      const double xi = similarity(seen.content, index_.content(place));
+      const VerifiedCandidate neighbour = verified(seen.features, {place, xi});
+      if (is_better(neighbour, best)) best = neighbour;
+    }
+    return best;
+  }
+
+  void decide(const Observation& seen, PlaceId end, Detection& detection) const {
+    if (seen.verified.empty()) {
+      detection.status = end == 0 ? Status::no_earlier_place : Status::no_similar_place;
+      return;
+    }
+    auto best = *std::min_element(seen.verified.begin(), seen.verified.end(),
+                                  [&](const auto& a, const auto& b) { return is_better(a, b); });
+    const auto accepted = [&] { return agreement_.score(best) >= options_.decision.min_score; };
+    if (accepted()) best = refined(best, seen, end);
+    detection.status = accepted() ? Status::loop : reason_of_rejection(best, options_.verification);
+    detection.match = best.candidate.place;
+    detection.score = agreement_.score(best);
+    detection.similarity = best.candidate.similarity;
+    detection.matches = best.matches;
+    detection.inliers = best.inliers;
+  }
+
+  LoopDetectorOptions options_;
+  PlaceIndex index_;
+  std::vector<Features> features_;  ///< of each place
+  std::vector<double> times_s_;     ///< of each place; 0 where there is none
+  RecentView recent_view_;
+  Agreement agreement_;
+};
+
+LoopDetector::LoopDetector(const LoopDetectorOptions& options)
+    : impl_(std::make_unique<Impl>(options)) {}
+LoopDetector::~LoopDetector() = default;
+LoopDetector::LoopDetector(LoopDetector&&) noexcept = default;
+LoopDetector& LoopDetector::operator=(LoopDetector&&) noexcept = default;
+
+Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s) {
+  Impl::Observation seen;
+  Detection detection = impl_->detect(image, timestamp_s, seen);
+  impl_->remember(std::move(seen), timestamp_s);
+  return detection;
+}
+
+Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timestamp_s) const {
+  Impl::Observation seen;
+  return impl_->detect(image, timestamp_s, seen);
+}
+
+Detection LoopDetector::skip(std::optional<double> timestamp_s) {
+  return {
+      .frame = impl_->skip(timestamp_s), .timestamp_s = timestamp_s, .status = Status::unreadable};
+}
+
+PlaceId LoopDetector::size() const { return impl_->size(); }
+
+const LoopDetectorOptions& LoopDetector::options() const { return impl_->options(); }
+
+}  // namespace loopbit

@@ -1,0 +1,151 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/loop_detector_options.hpp"
+
+#include <charconv>
+#include <fstream>
+#include <sstream>
+#include <type_traits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "loopbit/error.hpp"
+
+namespace loopbit {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <typename Visit>
+void for_each_setting(LoopDetectorOptions& options, Visit&& visit) {
+  for_each_section(options, [&](std::string_view section, auto& part) {
+    using Part = std::remove_cvref_t<decltype(part)>;
+    for_each_field<Part>([&](const auto& field) { visit(section, field, part.*field.member); });
+  });
+}
+
+template <typename Value>
+Value parse_value(const std::string& name, const std::string& text) {
+  if constexpr (std::is_same_v<Value, bool>) {
+    if (text == "true") return true;
+    if (text == "false") return false;
+    throw Error(ErrorKind::option,
+                fmt::format("{} is '{}', but must be true or false.", name, text));
+  } else {
+    Value value{};
+    const char* end = text.data() + text.size();
+    const auto parsed = std::from_chars(text.data(), end, value);
+    if (parsed.ec == std::errc{} && parsed.ptr == end) return value;
+    throw Error(ErrorKind::option,
+                fmt::format("{} is '{}', but must be {}.", name, text,
+                            std::is_same_v<Value, int> ? "a whole number" : "a number"));
+  }
+}
+
+std::string parse_context(const Json::parse_error& error) {
+  const std::string what = error.what();
+  const auto colon = what.find("at line");
+  return colon == std::string::npos ? what : what.substr(colon);
+}
+
+/// A JSON value as set_option would take it.
+std::string to_text(const std::string& name, const Json& value) {
+  if (value.is_boolean() || value.is_number()) return value.dump();
+  throw Error(ErrorKind::option,
+              fmt::format("{} is {}, but must be a number or a truth value.", name, value.dump()));
+}
+
+void set_all(LoopDetectorOptions& options, const Json& json) {
+  for (const auto& [section, settings] : json.items()) {
+    if (!settings.is_object()) {
+      throw Error(ErrorKind::option, fmt::format("'{}' is {}, but must be an object of settings.",
+                                                 section, settings.dump()));
+    }
+    for (const auto& [field, value] : settings.items()) {
+      const std::string name = fmt::format("{}.{}", section, field);
+      set_option(options, name, to_text(name, value));
+    }
+  }
+}
+
+}  // namespace
+
+void validate(const LoopDetectorOptions& options) {
+  for_each_section(options,
+                   [](std::string_view section, const auto& part) { validate(part, section); });
+  if (options.exclusion.frames > 0 && options.exclusion.seconds > 0) {
+    throw Error(ErrorKind::option,
+                fmt::format("exclusion.frames is {} and exclusion.seconds is {}, but only one of "
+                            "them can fix the window; set the other to 0.",
+                            options.exclusion.frames, options.exclusion.seconds));
+  }
+}
+
+void set_option(LoopDetectorOptions& options, const std::string& name, const std::string& value) {
+  bool found = false;
+  for_each_setting(options, [&](std::string_view section, const auto& field, auto& setting) {
+    if (fmt::format("{}.{}", section, field.name) != name) return;
+    setting = parse_value<std::remove_cvref_t<decltype(setting)>>(name, value);
+    check_range(section, field.name, static_cast<double>(setting), static_cast<double>(field.min),
+                static_cast<double>(field.max));
+    found = true;
+  });
+  if (found) return;
+  std::string names;
+  for (const OptionInfo& option : list_options()) names += ' ' + option.name;
+  throw Error(ErrorKind::option,
+              fmt::format("There is no setting '{}'; the settings are:{}.", name, names));
+}
+
+std::string to_json(const LoopDetectorOptions& options) {
+  Json json;
+  LoopDetectorOptions copy = options;
+  for_each_setting(copy, [&](std::string_view section, const auto& field, const auto& setting) {
+    json[std::string(section)][std::string(field.name)] = setting;
+  });
+  return json.dump(2);
+}
+
+LoopDetectorOptions options_from_json(const std::string& json, const std::string& source) {
+  LoopDetectorOptions options;
+  try {
+    const Json parsed = Json::parse(json, nullptr, true, true);
+    if (!parsed.is_object()) {
+      throw Error(ErrorKind::option, "The settings must be a JSON object of sections.");
+    }
+    set_all(options, parsed);
+    validate(options);
+  } catch (const Json::parse_error& error) {
+    throw Error(ErrorKind::option,
+                fmt::format("{} is not valid JSON: {}.", source, parse_context(error)));
+  } catch (const Error& error) {
+    throw Error(ErrorKind::option, fmt::format("{}: {}", source, error.what()));
+  }
+  return options;
+}
+
+LoopDetectorOptions load_options(const std::string& path) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) {
+    throw Error(
+        ErrorKind::input,
+        fmt::format("Cannot read the settings file '{}'; check its name and permissions.", path));
+  }
+  return options_from_json(text.str(), path);
+}
+
+std::vector<OptionInfo> list_options() {
+  std::vector<OptionInfo> list;
+  LoopDetectorOptions defaults;
+  for_each_setting(defaults, [&](std::string_view section, const auto& field, const auto& setting) {
+    constexpr bool kIsSwitch = std::is_same_v<std::remove_cvref_t<decltype(setting)>, bool>;
+    list.push_back({fmt::format("{}.{}", section, field.name), fmt::format("{}", setting),
+                    kIsSwitch ? "true or false" : fmt::format("{} to {}", field.min, field.max),
+                    std::string(field.help)});
+  });
+  return list;
+}
+
+}  // namespace loopbit

@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "recent_view.hpp"
+
+#include <algorithm>
+
+namespace loopbit {
+namespace {
+
+constexpr std::size_t kMaxStepsForward = 2;
+/// The view's reach is measured with single frames, some of them blurred or empty, so as much again
+/// is kept clear of candidates, but no more than this: a robot that worked an hour in one room must
+/// recognise what it saw before.
+constexpr std::size_t kMaxMarginSteps = 30;
+
+}  // namespace
+
+RecentView::Look RecentView::look(PlaceId newest, bool is_step,
+                                  const std::function<bool(PlaceId)>& in_view) const {
+  Look look{is_step, far_step_, 0};
+  if (is_step) {
+    const std::size_t furthest = std::min(far_step_ + kMaxStepsForward, steps_.size());
+    while (look.far_step < furthest && !in_view(steps_[look.far_step])) ++look.far_step;
+  }
+  const std::size_t reach = steps_.size() - look.far_step;
+  const std::size_t begin = look.far_step - std::min({reach, kMaxMarginSteps, look.far_step});
+  look.begin = begin < steps_.size() ? steps_[begin] : newest;
+  return look;
+}
+
+void RecentView::remember(PlaceId newest, const Look& look) {
+  if (look.is_step) steps_.push_back(newest);
+  far_step_ = look.far_step;
+}
+
+}  // namespace loopbit

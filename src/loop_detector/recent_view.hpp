@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <vector>
+
+#include "loopbit/place_index.hpp"
+
+namespace loopbit {
+
+/// How far back the camera's present view reaches without a break, which is where "recent" ends and
+/// "earlier" begins.
+///
+/// Driving forward, the scene ahead is seen again and again; standing still, all of it is. Neither
+/// is a revisit. So the view is followed along the frames that changed it (steps: a camera at rest
+/// makes none): its far end stays at a step for as long as that step shares geometry with the
+/// newest one, and moves on by at most two steps a step, so that one blurred frame does not cut the
+/// view off.
+class RecentView {
+ public:
+  /// Where the far end of the view would be if the camera were now at a new frame.
+  struct Look {
+    bool is_step = false;      ///< the new frame changes the view
+    std::size_t far_step = 0;  ///< the oldest step still in view, an index
+    PlaceId begin = 0;         ///< the first place that is recent; those before are candidates
+  };
+
+  /// `newest`: the number of the new frame. `is_step`: it differs from latest_step() in looks.
+  /// `in_view(place)`: it shares geometry with that place; asked at most three times.
+  [[nodiscard]] Look look(PlaceId newest, bool is_step,
+                          const std::function<bool(PlaceId)>& in_view) const;
+
+  /// Makes `look` the present state. `newest` as in look().
+  void remember(PlaceId newest, const Look& look);
+
+  [[nodiscard]] bool empty() const { return steps_.empty(); }
+  [[nodiscard]] PlaceId latest_step() const { return steps_.back(); }
+
+ private:
+  std::vector<PlaceId> steps_;
+  std::size_t far_step_ = 0;
+};
+
+}  // namespace loopbit
