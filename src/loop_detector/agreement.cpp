@@ -16,7 +16,8 @@ constexpr int kMaxPlacesPerFrame = 3;
 int best_inliers_near(const std::vector<VerifiedCandidate>& frame, PlaceId place, int radius) {
   int best = 0;
   for (const VerifiedCandidate& other : frame) {
-    if (std::abs(other.candidate.place - place) <= radius) best = std::max(best, other.inliers);
+    if (std::abs(other.candidate.place - place) > radius) continue;
+    best = std::max(best, other.distinct_inliers);
   }
   return best;
 }
@@ -24,7 +25,7 @@ int best_inliers_near(const std::vector<VerifiedCandidate>& frame, PlaceId place
 }  // namespace
 
 double Agreement::score(const VerifiedCandidate& verified) const {
-  if (verified.inliers == 0) return 0.0;
+  if (verified.distinct_inliers == 0) return 0.0;
   int support = 0;
   int radius = kMaxPlacesPerFrame;
   for (auto frame = recent_.rbegin(); frame != recent_.rend(); ++frame) {
@@ -32,7 +33,7 @@ double Agreement::score(const VerifiedCandidate& verified) const {
     support += std::max(0, inliers - options_.chance_inliers);
     radius += kMaxPlacesPerFrame;
   }
-  return verified.inliers + options_.agreement_weight * support;
+  return verified.distinct_inliers + options_.agreement_weight * support;
 }
 
 void Agreement::remember(std::vector<VerifiedCandidate> frame) {

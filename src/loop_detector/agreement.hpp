@@ -15,6 +15,7 @@ struct VerifiedCandidate {
   Candidate candidate;
   int matches = 0;
   int inliers = 0;
+  int distinct_inliers = 0;
 };
 
 /// The verified candidates of the last few frames. A robot that revisits keeps revisiting, so
@@ -24,9 +25,9 @@ class Agreement {
  public:
   explicit Agreement(const DecisionOptions& options) : options_(options) {}
 
-  /// The score of a verified candidate of the next frame: its inliers, and those beyond chance of
-  /// the best neighbouring candidate in each of the frames before, at a lower weight. 0 without
-  /// inliers. This is the number that decision.min_score is compared with, and the only one.
+  /// The score of a verified candidate of the next frame: its distinct inliers, and those beyond
+  /// chance of the best neighbouring candidate in each of the frames before, at a lower weight. 0
+  /// without inliers. This number, and no other, is compared with decision.min_score.
   [[nodiscard]] double score(const VerifiedCandidate& verified) const;
 
   /// Notes the candidates of a frame (none for a frame without image).

@@ -135,7 +135,7 @@ class LoopDetector::Impl {
                                            const Candidate& candidate) const {
     const Verification result = verify(query, features(candidate.place), options_.verification);
     return {candidate, static_cast<int>(result.matches.size()),
-            static_cast<int>(result.inliers.size())};
+            static_cast<int>(result.inliers.size()), result.distinct_inliers};
   }
 
   /// The end of the places that may be candidates; notes in `seen` how far back the view reaches.

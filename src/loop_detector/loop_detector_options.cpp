@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/loop_detector_options.hpp"
 
-#include <charconv>
+#include <algorithm>
 #include <fstream>
 #include <sstream>
 #include <type_traits>
@@ -23,24 +23,6 @@ void for_each_setting(LoopDetectorOptions& options, Visit&& visit) {
     using Part = std::remove_cvref_t<decltype(part)>;
     for_each_field<Part>([&](const auto& field) { visit(section, field, part.*field.member); });
   });
-}
-
-template <typename Value>
-Value parse_value(const std::string& name, const std::string& text) {
-  if constexpr (std::is_same_v<Value, bool>) {
-    if (text == "true") return true;
-    if (text == "false") return false;
-    throw Error(ErrorKind::option,
-                fmt::format("{} is '{}', but must be true or false.", name, text));
-  } else {
-    Value value{};
-    const char* end = text.data() + text.size();
-    const auto parsed = std::from_chars(text.data(), end, value);
-    if (parsed.ec == std::errc{} && parsed.ptr == end) return value;
-    throw Error(ErrorKind::option,
-                fmt::format("{} is '{}', but must be {}.", name, text,
-                            std::is_same_v<Value, int> ? "a whole number" : "a number"));
-  }
 }
 
 std::string parse_context(const Json::parse_error& error) {
@@ -83,13 +65,11 @@ void validate(const LoopDetectorOptions& options) {
 }
 
 void set_option(LoopDetectorOptions& options, const std::string& name, const std::string& value) {
+  const auto dot = std::min(name.find('.'), name.size());
+  const std::string field = name.substr(std::min(dot + 1, name.size()));
   bool found = false;
-  for_each_setting(options, [&](std::string_view section, const auto& field, auto& setting) {
-    if (fmt::format("{}.{}", section, field.name) != name) return;
-    setting = parse_value<std::remove_cvref_t<decltype(setting)>>(name, value);
-    check_range(section, field.name, static_cast<double>(setting), static_cast<double>(field.min),
-                static_cast<double>(field.max));
-    found = true;
+  for_each_section(options, [&](std::string_view section, auto& part) {
+    if (section == name.substr(0, dot)) found = set_field(part, section, field, value);
   });
   if (found) return;
   std::string names;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/verification.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -78,15 +79,26 @@ void match_group(std::span<const Descriptor> query, std::size_t first_query,
   }
 }
 
+const Keypoint& keypoint(const Features& features, int index) {
+  return features.keypoints[static_cast<std::size_t>(index)];
+}
+
 std::vector<cv::Point2f> positions(const Features& features, const std::vector<Match>& matches,
                                    int Match::*side) {
   std::vector<cv::Point2f> points;
   points.reserve(matches.size());
   for (const Match& match : matches) {
-    const Keypoint& keypoint = features.keypoints[static_cast<std::size_t>(match.*side)];
-    points.emplace_back(keypoint.x_px, keypoint.y_px);
+    const Keypoint& point = keypoint(features, match.*side);
+    points.emplace_back(point.x_px, point.y_px);
   }
   return points;
+}
+
+bool overlap(const Keypoint& a, const Keypoint& b, double min_spacing_scales) {
+  const double dx = a.x_px - b.x_px;
+  const double dy = a.y_px - b.y_px;
+  const double spacing = min_spacing_scales * std::min(a.scale, b.scale);
+  return dx * dx + dy * dy < spacing * spacing;
 }
 
 }  // namespace
@@ -118,6 +130,21 @@ std::vector<Match> epipolar_inliers(const Features& query, const Features& place
   return inliers;
 }
 
+int distinct_inliers(const Features& query, const Features& place,
+                     const std::vector<Match>& inliers, double min_spacing_scales) {
+  const auto repeats = [&](const Match& a, const Match& b) {
+    return overlap(keypoint(query, a.query), keypoint(query, b.query), min_spacing_scales) ||
+           overlap(keypoint(place, a.place), keypoint(place, b.place), min_spacing_scales);
+  };
+  std::vector<Match> distinct;
+  for (const Match& match : inliers) {
+    const bool is_new = std::none_of(distinct.begin(), distinct.end(),
+                                     [&](const Match& other) { return repeats(match, other); });
+    if (is_new) distinct.push_back(match);
+  }
+  return static_cast<int>(distinct.size());
+}
+
 Verification verify(const Features& query, const Features& place,
                     const VerificationOptions& options) {
   validate(options, "verification");
@@ -125,6 +152,8 @@ Verification verify(const Features& query, const Features& place,
   result.matches = match_features(query, place, options.max_ratio);
   if (result.matches.size() < static_cast<std::size_t>(options.min_matches)) return result;
   result.inliers = epipolar_inliers(query, place, result.matches, options.max_epipolar_error_px);
+  result.distinct_inliers =
+      distinct_inliers(query, place, result.inliers, options.min_spacing_scales);
   return result;
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string_view>
 
@@ -19,6 +20,10 @@ enum class Status {
   low_score,         ///< a geometry, but too little evidence to accept the match
   unreadable,        ///< there was no usable image
 };
+
+inline constexpr std::array kAllStatuses{
+    Status::loop,        Status::no_earlier_place, Status::no_similar_place, Status::few_matches,
+    Status::no_geometry, Status::low_score,        Status::unreadable};
 
 /// "loop", "no_earlier_place", ...: the enumerator's name, as it stands in loops.csv.
 std::string_view to_string(Status status);

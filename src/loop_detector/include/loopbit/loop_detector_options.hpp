@@ -40,7 +40,7 @@ struct ExclusionOptions {
 
 /// The one rule that accepts a match: score >= min_score.
 struct DecisionOptions {
-  double min_score = 20.0;
+  double min_score = 18.0;
   int agreement_frames = 2;
   double agreement_weight = 0.5;
   int chance_inliers = 8;
@@ -52,9 +52,10 @@ struct DecisionOptions {
         Field{"agreement_frames", &S::agreement_frames, 0, 100,
               "frames just before the query that can support its match; 0 = each frame on its own"},
         Field{"agreement_weight", &S::agreement_weight, 0.0, 1.0,
-              "what a supporting frame's inlier adds to the score; one of the query's adds 1"},
+              "what a supporting frame's distinct inlier adds to the score; one of the query's "
+              "adds 1"},
         Field{"chance_inliers", &S::chance_inliers, 0, 100,
-              "inliers that images of different places share by chance; fewer support nothing"}};
+              "distinct inliers that different places share by chance; fewer support nothing"}};
   }
 };
 

@@ -24,6 +24,7 @@ struct VerificationOptions {
   double max_ratio = 0.8;
   int min_matches = 8;
   double max_epipolar_error_px = 2.0;
+  double min_spacing_scales = 10.0;
 
   static constexpr auto fields() {
     using S = VerificationOptions;
@@ -32,7 +33,9 @@ struct VerificationOptions {
               "a match is kept if its distance is at most this part of the second best"},
         Field{"min_matches", &S::min_matches, 8, 1000, "with fewer matches no geometry is sought"},
         Field{"max_epipolar_error_px", &S::max_epipolar_error_px, 0.1, 50.0,
-              "an inlier lies at most this far from its epipolar line, working pixels"}};
+              "an inlier lies at most this far from its epipolar line, working pixels"},
+        Field{"min_spacing_scales", &S::min_spacing_scales, 0.0, 100.0,
+              "inliers closer than this are one piece of evidence; a descriptor spans 20 scales"}};
   }
 };
 
@@ -40,6 +43,7 @@ struct VerificationOptions {
 struct Verification {
   std::vector<Match> matches;  ///< one to one
   std::vector<Match> inliers;  ///< those that one epipolar geometry explains
+  int distinct_inliers = 0;    ///< see distinct_inliers()
 };
 
 /// Mutual best matches by the distance of descriptors that pass the ratio test from either side;
@@ -53,7 +57,14 @@ std::vector<Match> match_features(const Features& query, const Features& place, 
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
                                     const std::vector<Match>& matches, double max_error_px);
 
-/// Step 3 for one candidate: match_features, then epipolar_inliers.
+/// How many of `inliers`, first come first served, lie apart from each other in both images: at
+/// least `min_spacing_scales` times the smaller of two keypoints' scales. Keypoints whose patches
+/// overlap see the same few pixels, and a small thing seen everywhere (a lamp, the end of a zebra
+/// crossing) has many of them, so they are not independent evidence.
+int distinct_inliers(const Features& query, const Features& place,
+                     const std::vector<Match>& inliers, double min_spacing_scales);
+
+/// Step 3 for one candidate: match_features, epipolar_inliers, distinct_inliers.
 Verification verify(const Features& query, const Features& place,
                     const VerificationOptions& options = {});
 
