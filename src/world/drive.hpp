@@ -1,0 +1,41 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include "loopbit/world.hpp"
+
+#include "circuit.hpp"
+
+namespace loopbit::town {
+
+/// The way of the camera along the circuit, lap after lap.
+class Drive {
+ public:
+  /// `circuit` must outlive the drive.
+  Drive(const WorldOptions& options, const Circuit& circuit);
+
+  [[nodiscard]] int lap(int frame) const;
+  [[nodiscard]] double driven_m(int frame) const { return frame * spacing_m_; }
+  [[nodiscard]] bool blank(int frame) const;
+  [[nodiscard]] StreetPoint camera(int frame) const;
+
+  /// How far left of the centre line, seen in the direction of travel, the camera is.
+  [[nodiscard]] double left_m(int frame) const;
+
+  /// The point `ahead_m` metres further in the direction of travel, `left_m` left of the centre
+  /// line. Its heading is that of the street there, in the direction of travel.
+  [[nodiscard]] StreetPoint ahead(int frame, double ahead_m, double left_m) const;
+
+ private:
+  [[nodiscard]] double along_m(int frame) const;
+  [[nodiscard]] bool reversed(int frame) const { return reverse_second_ && lap(frame) == 1; }
+  [[nodiscard]] double left_m(int lap, bool reversed, double driven_m) const;
+
+  const Circuit& circuit_;
+  std::uint32_t seed_;
+  double spacing_m_;
+  double lateral_offset_m_;
+  bool reverse_second_;
+};
+
+}  // namespace loopbit::town

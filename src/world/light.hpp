@@ -1,0 +1,32 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+
+#include "color.hpp"
+#include "scene.hpp"
+
+namespace loopbit::town {
+
+/// Sun and sky of a lap.
+struct Light {
+  double azimuth_rad = 0.6;  // of the sun, from east to north
+  double rise = 1.0;         // tangent of its elevation
+  Vec2 to_sun;               // unit vector in the plane, from azimuth_rad
+  Color sun;                 // on a surface that faces it
+  Color ambient;
+  Color sky_top;
+  Color sky_low;
+  Color cloud;
+  float cloud_cover = 0.5F;
+  float cloud_shift = 0.0F;
+};
+
+/// The light of `lap`, `change` (0 to 1) of the way from the first lap's to a light of its own.
+Light light_of_lap(std::uint32_t seed, int lap, double change);
+
+/// The sky in the direction (x, y, rise), where (x, y) is a unit vector and rise a tangent >= 0.
+Color sky_color(const Light& light, Vec2 direction, float rise);
+
+}  // namespace loopbit::town

@@ -1,0 +1,129 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <array>
+
+#include "chance.hpp"
+#include "surfaces.hpp"
+
+namespace loopbit::town {
+namespace {
+
+constexpr std::array<Color, 8> kCarPaints{rgb(0.70F, 0.71F, 0.72F), rgb(0.16F, 0.17F, 0.19F),
+                                          rgb(0.85F, 0.85F, 0.84F), rgb(0.56F, 0.13F, 0.12F),
+                                          rgb(0.15F, 0.25F, 0.45F), rgb(0.35F, 0.37F, 0.39F),
+                                          rgb(0.22F, 0.36F, 0.30F), rgb(0.72F, 0.62F, 0.28F)};
+constexpr Color kCarGlass = rgb(0.16F, 0.19F, 0.22F);
+constexpr Color kTyre = rgb(0.07F, 0.07F, 0.07F);
+constexpr float kBelt_m = 0.95F;  // where a car's windows begin
+constexpr float kWheel_m = 0.31F;
+
+Color car_paint(const Prism& car) { return kCarPaints[car.detail % kCarPaints.size()]; }
+
+float outline_height(const Prism& car, float v) {
+  for (int i = 1; i < car.outline_size; ++i) {
+    const OutlinePoint& a = car.outline[static_cast<std::size_t>(i - 1)];
+    const OutlinePoint& b = car.outline[static_cast<std::size_t>(i)];
+    if (v <= b.v && b.v > a.v) return blend(a.z, b.z, clamp01((v - a.v) / (b.v - a.v)));
+  }
+  return car.outline[static_cast<std::size_t>(car.outline_size - 1)].z;
+}
+
+Color wheel(Color color, float v, float z, float footprint) {
+  const float radius = std::sqrt(v * v + (z - kWheel_m) * (z - kWheel_m));
+  color = blend(color, gray(0.05F), cover(radius, -1.0F, kWheel_m + 0.06F, footprint));
+  color = blend(color, kTyre, cover(radius, -1.0F, kWheel_m, footprint));
+  return blend(color, gray(0.55F), cover(radius, -1.0F, 0.19F, footprint));
+}
+
+}  // namespace
+
+Color car_side_color(const Prism& car, float v, float z, float footprint) {
+  const float half = car.v_max();
+  const float top = outline_height(car, v);
+  Color color = car_paint(car) * blend(0.8F, 1.05F, clamp01(z / 0.9F));
+  color = blend(color, color * 0.6F, cover(v, -0.12F, -0.09F, footprint));
+  color = blend(color, color * 0.6F, cover(v, 0.78F, 0.81F, footprint));
+  color = blend(color, gray(0.2F), cover(z, 0.2F, 0.3F, footprint));
+  const float window = cover(z, kBelt_m, top - 0.08F, footprint);
+  const float pillar = cover(v, -0.14F, -0.04F, footprint);
+  color = blend(color, kCarGlass, window * (1.0F - pillar));
+  color = blend(color, kTyre, cover(z, -1.0F, 0.2F, footprint));
+  color = wheel(color, v + half * 0.62F, z, footprint);
+  return wheel(color, v - half * 0.64F, z, footprint);
+}
+
+Color car_end_color(const Prism& car, float u, float z, float footprint, bool nose) {
+  const float x = std::abs(u);
+  Color color = car_paint(car) * 0.9F;
+  color = blend(color, gray(0.16F), cover(z, 0.25F, 0.42F, footprint));
+  const float lamps = cover(x, 0.52F, 0.8F, footprint) *
+                      (nose ? cover(z, 0.5F, 0.62F, footprint) : cover(z, 0.58F, 0.8F, footprint));
+  color = blend(color, nose ? rgb(0.95F, 0.95F, 0.88F) : rgb(0.62F, 0.06F, 0.06F), lamps);
+  const float plate = cover(x, -1.0F, 0.26F, footprint) * cover(z, 0.44F, 0.55F, footprint);
+  const float marks = glyphs(car.detail, u + 0.22F, z - 0.46F, 0.07F, footprint);
+  color = blend(color, blend(gray(0.88F), gray(0.1F), marks), plate);
+  const bool tall = car.outline[0].z > 1.5F;
+  if (tall && !nose) {
+    color = blend(color, kCarGlass,
+                  cover(z, 1.15F, 1.75F, footprint) * cover(x, 0.06F, 0.7F, footprint));
+  }
+  color = blend(color, kTyre, cover(z, -1.0F, 0.2F, footprint));
+  return blend(color, kTyre, cover(z, -1.0F, 0.32F, footprint) * cover(x, 0.6F, 0.8F, footprint));
+}
+
+Color car_top_color(const Prism& car, float v, float footprint) {
+  const float slope = outline_height(car, v + 0.05F) - outline_height(car, v - 0.05F);
+  const float height = outline_height(car, v);
+  const bool glass =
+      std::abs(slope) > 0.045F && height > 1.02F && height < car.outline[3].z - 0.03F;
+  const Color paint = car_paint(car) * 1.12F;
+  if (!glass) return paint;
+  return blend(paint, kCarGlass + gray(0.12F * height), resolved(0.8F, footprint));
+}
+
+Color plain_wall_color(std::uint32_t detail, float u, float z, float footprint) {
+  constexpr Color kBare = rgb(0.60F, 0.60F, 0.59F);
+  const float seam = cover(wrap(u, 4.0F), 0.0F, 0.02F, footprint);
+  const float cloudy = 0.035F * noise_of_size(detail, u, z, 2.5F, footprint);
+  return kBare * (1.0F + cloudy - 0.04F * seam - 0.06F * clamp01(1.0F - z));
+}
+
+Color hedge_color(std::uint32_t detail, float u, float z, float footprint) {
+  const float leaves = 0.5F * noise_of_size(detail, u, z, 0.3F, footprint) +
+                       0.6F * noise_of_size(detail + 1, u, z, 0.07F, footprint);
+  return rgb(0.22F, 0.34F, 0.16F) * (0.75F + 0.25F * z + leaves);
+}
+
+Color chimney_color(const HouseStyle& style, float u, float z, float footprint) {
+  const float joint = cover(wrap(z, 0.15F), 0.0F, 0.03F, footprint) * resolved(0.15F, footprint);
+  const Color brick = blend(style.roof, rgb(0.5F, 0.32F, 0.26F), 0.7F);
+  return brick * (0.95F - 0.3F * joint + 0.3F * noise_of_size(style.seed, u, z, 0.2F, footprint));
+}
+
+Color roof_color(const HouseStyle& style, float u, float v, float footprint) {
+  constexpr float kTile_m = 0.28F;
+  const float fade = resolved(kTile_m, footprint);
+  const float own =
+      unit(hash_of(style.seed + 21, floor_int(u / kTile_m), floor_int(v / kTile_m))) - 0.5F;
+  const float step = cover(wrap(v, kTile_m), 0.0F, 0.07F, footprint);
+  const float moss = 0.3F * noise_of_size(style.seed + 22, u, v, 1.2F, footprint);
+  return style.roof * (1.0F + fade * (0.35F * own - 0.4F * step) + moss);
+}
+
+float glyphs(std::uint32_t seed, float x, float y, float height_m, float footprint) {
+  constexpr float kColumns = 3.0F;
+  constexpr float kRows = 5.0F;
+  constexpr float kMeanInk = 0.3F;
+  const float advance = height_m * 0.85F;
+  const int letter = floor_int(x / advance);
+  const int letters = 3 + static_cast<int>(seed % 9);
+  if (y < 0 || y >= height_m || letter < 0 || letter >= letters) return 0.0F;
+  const float in_letter = (x / advance - static_cast<float>(letter)) / 0.8F;
+  if (in_letter >= 1.0F) return 0.0F;
+  const int cell = floor_int(in_letter * kColumns) + 3 * floor_int(y / height_m * kRows);
+  const std::uint32_t strokes = hash_of(seed, letter);
+  const float ink = ((strokes >> (cell + 8)) & 1U) != 0 ? 1.0F : 0.0F;
+  return blend(kMeanInk, ink, resolved(height_m / kRows, footprint));
+}
+
+}  // namespace loopbit::town

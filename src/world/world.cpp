@@ -1,0 +1,257 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/world.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+#include "chance.hpp"
+#include "circuit.hpp"
+#include "column_tracer.hpp"
+#include "drive.hpp"
+#include "light.hpp"
+#include "shader.hpp"
+#include "town.hpp"
+#include "traffic.hpp"
+#include "truth.hpp"
+
+namespace loopbit {
+namespace {
+
+using namespace town;  // NOLINT(google-build-using-namespace): the private parts of this one
+
+constexpr double kFocal = 0.595876796;  // of a width: 80 degrees across
+constexpr double kHorizon = 0.55;       // of the height, from the top
+constexpr double kEye_m = 1.6;
+constexpr double kNod_px = 3.0;     // of the horizon, from end to end, at a width of 640
+constexpr double kNodFrames = 3.0;  // between two nods
+constexpr double kDrivenBetween_m = 50.0;
+constexpr double kCosSame = 0.8660254037844386;  // 30 degrees
+constexpr double kCosNear = 0.5;                 // 60 degrees
+constexpr double kFramesPerSecond = 10.0;
+
+constexpr std::uint32_t kNodSalt = 0x40dU;
+constexpr std::uint32_t kNoiseSalt = 0x4015eU;
+
+WorldOptions checked(const WorldOptions& options) {
+  validate(options, "world");
+  if (options.near_place_m < options.same_place_m) {
+    throw Error(ErrorKind::option,
+                fmt::format("world.near_place_m is {}, but must be at least world.same_place_m, "
+                            "which is {}.",
+                            options.near_place_m, options.same_place_m));
+  }
+  const double circuit_m = options.frames * options.spacing_m / options.laps;
+  if (circuit_m >= Circuit::kShortestCircuit_m) return options;
+  const double drive_m = Circuit::kShortestCircuit_m * options.laps;
+  throw Error(ErrorKind::option,
+              fmt::format("world: {} frames {} m apart in {} laps make a circuit of {:.0f} m, but "
+                          "the shortest has {} m: take {:.0f} frames or more, or set spacing_m to "
+                          "{:.2f} or more.",
+                          options.frames, options.spacing_m, options.laps, circuit_m,
+                          Circuit::kShortestCircuit_m, std::ceil(drive_m / options.spacing_m),
+                          std::ceil(drive_m / options.frames * 100) / 100));
+}
+
+double wrap_angle(double angle) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  const double wrapped = angle - kTurn * std::ceil(angle / kTurn - 0.5);
+  return std::clamp(wrapped, -std::numbers::pi, std::numbers::pi);
+}
+
+/// About normal, of mean 0 and standard deviation 1: the sum of the four bytes of a hash.
+float bell(std::uint32_t hash) {
+  constexpr float kMean = 510.0F;
+  constexpr float kSigma = 147.80392F;
+  const std::uint32_t sum =
+      (hash & 255U) + ((hash >> 8) & 255U) + ((hash >> 16) & 255U) + (hash >> 24);
+  return (static_cast<float>(sum) - kMean) / kSigma;
+}
+
+std::uint8_t to_byte(float value) {
+  return static_cast<std::uint8_t>(std::clamp(value + 0.5F, 0.0F, 255.0F));
+}
+
+}  // namespace
+
+struct World::Plan {
+  explicit Plan(const WorldOptions& wanted)
+      : options(checked(wanted)),
+        seed(scramble(static_cast<std::uint32_t>(options.seed))),
+        circuit(seed, options.frames * options.spacing_m / options.laps, options.blank_stretch),
+        drive(options, circuit),
+        town(seed, circuit, options.look_alike),
+        traffic(seed, circuit, drive, options.moving_objects) {}
+  Plan(const Plan&) = delete;
+  Plan& operator=(const Plan&) = delete;
+  ~Plan() = default;
+
+  [[nodiscard]] Camera camera(int frame) const;
+  [[nodiscard]] std::vector<View> views() const;
+  [[nodiscard]] PlaceRule rule(double distance_m, double cos_turn) const;
+  void store(int frame, int column, const std::vector<Color>& rows, cv::Mat& image) const;
+
+  WorldOptions options;
+  std::uint32_t seed;
+  Circuit circuit;
+  Drive drive;
+  Town town;
+  Traffic traffic;
+};
+
+Camera World::Plan::camera(int frame) const {
+  const StreetPoint at = drive.camera(frame);
+  const auto [sin, cos] = sin_cos(at.heading_rad);
+  Camera camera;
+  camera.eye = at.at;
+  camera.forward = {cos, sin};
+  camera.eye_m = kEye_m;
+  camera.width_px = options.width_px;
+  camera.height_px = options.height_px;
+  camera.focal_px = kFocal * options.width_px;
+  const double nod = smooth_noise(seed ^ kNodSalt, frame / kNodFrames) - 0.5;
+  camera.horizon_px = kHorizon * options.height_px + nod * kNod_px * options.width_px / 640.0;
+  return camera;
+}
+
+std::vector<View> World::Plan::views() const {
+  std::vector<View> views;
+  views.reserve(static_cast<std::size_t>(options.frames));
+  for (int frame = 0; frame < options.frames; ++frame) {
+    const Camera at = camera(frame);
+    views.push_back({at.eye, at.forward});
+  }
+  return views;
+}
+
+PlaceRule World::Plan::rule(double distance_m, double cos_turn) const {
+  return {distance_m, cos_turn, options.opposite_counts,
+          static_cast<int>(std::ceil(kDrivenBetween_m / options.spacing_m))};
+}
+
+void World::Plan::store(int frame, int column, const std::vector<Color>& rows,
+                        cv::Mat& image) const {
+  const std::uint32_t noise = hash_of(seed ^ kNoiseSalt, frame, column);
+  const auto sigma = static_cast<float>(options.noise);
+  for (int row = 0; row < image.rows; ++row) {
+    const Color& color = rows[static_cast<std::size_t>(row)];
+    const float grain =
+        sigma > 0 ? sigma * bell(scramble(noise + static_cast<std::uint32_t>(row))) : 0.0F;
+    image.at<cv::Vec3b>(row, column) = {to_byte(color.b * 255.0F + grain),
+                                        to_byte(color.g * 255.0F + grain),
+                                        to_byte(color.r * 255.0F + grain)};
+  }
+}
+
+World::World(const WorldOptions& options) : plan_(std::make_unique<Plan>(options)) {}
+World::~World() = default;
+World::World(World&&) noexcept = default;
+World& World::operator=(World&&) noexcept = default;
+
+const WorldOptions& World::options() const noexcept { return plan_->options; }
+
+double World::circuit_m() const noexcept { return plan_->circuit.length_m(); }
+
+int World::lap(int frame) const {
+  assert(frame >= 0 && frame < options().frames);
+  return plan_->drive.lap(frame);
+}
+
+Pose World::pose(int frame) const {
+  assert(frame >= 0 && frame < options().frames);
+  const StreetPoint at = plan_->drive.camera(frame);
+  return {at.at.x, at.at.y, wrap_angle(at.heading_rad)};
+}
+
+bool World::blank(int frame) const {
+  assert(frame >= 0 && frame < options().frames);
+  return plan_->drive.blank(frame);
+}
+
+cv::Mat World::render(int frame) const {
+  assert(frame >= 0 && frame < options().frames);
+  const Camera camera = plan_->camera(frame);
+  Scene scene;
+  plan_->town.add_surroundings(camera.eye, scene);
+  plan_->traffic.add_to(frame, scene);
+  const Light light =
+      light_of_lap(plan_->seed, plan_->drive.lap(frame), plan_->options.light_change);
+  const ColumnTracer tracer(camera, scene);
+  Shader shader(camera, scene, plan_->town, light, plan_->seed);
+
+  cv::Mat image(camera.height_px, camera.width_px, CV_8UC3);
+  std::vector<Piece> pieces;
+  std::vector<Color> rows(static_cast<std::size_t>(camera.height_px));
+  for (int column = 0; column < camera.width_px; ++column) {
+    const float skyline_px = tracer.trace(column, pieces);
+    shader.draw(column, pieces, skyline_px, rows);
+    plan_->store(frame, column, rows, image);
+  }
+  return image;
+}
+
+double World::time_s(int frame) const { return frame / kFramesPerSecond; }
+
+std::vector<PlaceRun> World::same_place() const {
+  return find_places(plan_->views(), plan_->rule(options().same_place_m, kCosSame));
+}
+
+std::vector<PlaceRun> World::near_place() const {
+  return find_places(plan_->views(), plan_->rule(options().near_place_m, kCosNear));
+}
+
+std::size_t World::storage_bytes() const noexcept {
+  return sizeof(Plan) + plan_->circuit.storage_bytes();
+}
+
+namespace {
+
+class WorldSource final : public ImageSource {
+ public:
+  explicit WorldSource(std::shared_ptr<const World> world) : world_(std::move(world)) {}
+
+  bool next(Frame& frame) override {
+    if (at_end()) return false;
+    frame = {fmt::format("{:06}", frame_), world_->time_s(frame_), world_->render(frame_), {}};
+    ++frame_;
+    return true;
+  }
+
+  bool skip() override {
+    if (at_end()) return false;
+    ++frame_;
+    return true;
+  }
+
+  [[nodiscard]] std::optional<std::size_t> size() const override {
+    return static_cast<std::size_t>(world_->options().frames);
+  }
+
+  [[nodiscard]] std::string description() const override {
+    const WorldOptions& options = world_->options();
+    return fmt::format("built-in world, seed {}, {} frames, {} laps of {:.0f} m", options.seed,
+                       options.frames, options.laps, world_->circuit_m());
+  }
+
+ private:
+  [[nodiscard]] bool at_end() const { return frame_ >= world_->options().frames; }
+
+  std::shared_ptr<const World> world_;
+  int frame_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world) {
+  return std::make_unique<WorldSource>(std::move(world));
+}
+
+}  // namespace loopbit
