@@ -182,6 +182,10 @@ ImageList list_file(const fs::path& file) {
     list.images.push_back({row.text, {}});
   }
   if (list.images.empty()) throw_no_rows(file);
+  // Data sets often keep a list beside the folder of the images it names.
+  const fs::path images = list.root / "images";
+  const std::string& first = list.images.front().name;
+  if (!is_file(list.root / first) && is_file(images / first)) list.root = images;
   return list;
 }
 

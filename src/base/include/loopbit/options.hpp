@@ -55,4 +55,28 @@ void validate(const Struct& options, std::string_view section) {
   });
 }
 
+/// Reads all of `text` as a value: a whole number, a number, or "true" / "false". `name` is what
+/// errors call it. Throws Error (kind option) if it is none.
+void parse_value(const std::string& text, const std::string& name, int& value);
+void parse_value(const std::string& text, const std::string& name, double& value);
+void parse_value(const std::string& text, const std::string& name, bool& value);
+
+/// Sets the field called `name`; false if there is none. Throws Error (kind option) if `text` is not
+/// of its type or out of its range, and leaves it as it was.
+template <typename Struct>
+bool set_field(Struct& options, std::string_view section, std::string_view name,
+               const std::string& text) {
+  bool found = false;
+  for_each_field<Struct>([&](const auto& field) {
+    if (field.name != name) return;
+    auto value = options.*field.member;
+    parse_value(text, std::string(section) + '.' + std::string(name), value);
+    check_range(section, name, static_cast<double>(value), static_cast<double>(field.min),
+                static_cast<double>(field.max));
+    options.*field.member = value;
+    found = true;
+  });
+  return found;
+}
+
 }  // namespace loopbit

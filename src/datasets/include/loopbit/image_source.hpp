@@ -48,7 +48,8 @@ class ImageSource {
 ///  - a folder with `rgb.txt`: TUM RGB-D;
 ///  - any other folder: its images in natural order (2.png before 10.png), told by extension;
 ///    hidden files and sub-folders are passed over;
-///  - a .txt or .csv file: a list, one image a line, relative to the file, `#` for comments;
+///  - a .txt or .csv file: a list, one image a line, relative to the file or to a folder `images`
+///    beside it, `#` for comments;
 ///  - an image file: that one image;
 ///  - any other file: a video, its times counted from its first frame.
 /// Throws Error (kind input) if nothing is there, no image is found or a list is malformed, and
@@ -59,5 +60,9 @@ std::unique_ptr<ImageSource> open_source(const std::string& input);
 /// Frames left out are skipped, not decoded. Throws Error (kind option) if `every` is 0.
 std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source, std::size_t every,
                                        std::size_t limit);
+
+/// `source`, read ahead by a thread of its own, at most `depth` frames (at least 1). Frames and
+/// their order are the same; decoding overlaps with what is done with them.
+std::unique_ptr<ImageSource> prefetch(std::unique_ptr<ImageSource> source, std::size_t depth);
 
 }  // namespace loopbit

@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace loopbit {
+
+/// The frames first..last, all of them, show the place that frame `query` shows.
+struct PlaceRun {
+  int query = 0;
+  int first = 0;
+  int last = 0;
+
+  bool operator==(const PlaceRun&) const = default;
+};
+
+/// What is true about a sequence. A query may be in several runs.
+struct GroundTruth {
+  std::vector<PlaceRun> same_place;  ///< true earlier places
+  std::vector<PlaceRun> near_place;  ///< a match here is not false, nor right by this alone
+  std::vector<int> ignored;          ///< queries that are not scored
+};
+
+/// Reads rows of `query,first,last`; blank lines and `#` comments are passed over. Throws Error
+/// (kind input) that names file and line for anything else.
+std::vector<PlaceRun> read_place_runs(const std::string& path);
+
+/// Reads the frame that begins each row; what follows a comma is a remark. Errors as above.
+std::vector<int> read_frame_list(const std::string& path);
+
+/// Writes rows of `query,first,last` under a line of `comment`. Throws Error (kind output).
+void write_place_runs(const std::string& path, const std::string& comment,
+                      const std::vector<PlaceRun>& runs);
+
+}  // namespace loopbit

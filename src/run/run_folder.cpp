@@ -1,0 +1,201 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/run_folder.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <system_error>
+#include <thread>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/resource.h>
+#include <sys/utsname.h>
+#include <unistd.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/kernels.hpp"
+#include "loopbit/version.hpp"
+
+namespace loopbit {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kLoopsFile = "loops.csv";
+constexpr const char* kRecordFile = "run.json";
+
+[[noreturn]] void throw_cannot_write(const fs::path& path, int error, std::string_view kept = "") {
+  throw Error(ErrorKind::output,
+              fmt::format("Cannot write '{}': {}; check the folder, its permissions and the free "
+                          "space.{}",
+                          path.string(), std::strerror(error), kept));
+}
+
+void make_folder(const fs::path& folder, bool overwrite) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw_cannot_write(folder, error.value());
+  for (const char* name : {kLoopsFile, kRecordFile}) {
+    if (!fs::exists(folder / name)) continue;
+    if (!overwrite) {
+      throw Error(ErrorKind::output,
+                  fmt::format("'{}' holds an earlier run ({}); name another folder, or add "
+                              "--overwrite to replace it.",
+                              folder.string(), name));
+    }
+    if (!fs::remove(folder / name, error)) throw_cannot_write(folder / name, error.value());
+  }
+}
+
+std::string csv_row(const Detection& d) {
+  const StepTimes& t = d.times;
+  return fmt::format("{},{},{},{},{},{:.6f},{},{},{:.3f},{:.3f},{:.3f},{:.3f}\n", d.frame,
+                     d.timestamp_s ? fmt::format("{:.6f}", *d.timestamp_s) : "",
+                     to_string(d.status), d.match ? fmt::format("{}", *d.match) : "", d.score,
+                     d.similarity, d.matches, d.inliers, t.content_ms, t.retrieval_ms,
+                     t.features_ms, t.verification_ms);
+}
+
+std::string processor_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  }
+  return "unknown";
+}
+
+Json machine() {
+  utsname system{};
+  uname(&system);
+  return {{"processor", processor_name()},
+          {"cores", std::thread::hardware_concurrency()},
+          {"kernel", active_kernels().name},
+          {"system", fmt::format("{} {} {}", system.sysname, system.release, system.machine)}};
+}
+
+double peak_memory_mib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  constexpr double kKibPerMib = 1024.0;
+  return static_cast<double>(usage.ru_maxrss) / kKibPerMib;
+}
+
+Json counts(const std::vector<Detection>& detections) {
+  Json by_status;
+  for (const Status status : kAllStatuses) {
+    by_status[std::string(to_string(status))] =
+        std::count_if(detections.begin(), detections.end(),
+                      [&](const Detection& d) { return d.status == status; });
+  }
+  return {{"frames", detections.size()}, {"by_status", by_status}};
+}
+
+Json to_json(const TimeSummary& times) {
+  return {{"mean", times.mean}, {"p50", times.p50}, {"p99", times.p99}, {"max", times.max}};
+}
+
+Json times(const std::vector<Detection>& detections) {
+  return {{"content", to_json(summarize(detections, &StepTimes::content_ms))},
+          {"retrieval", to_json(summarize(detections, &StepTimes::retrieval_ms))},
+          {"features", to_json(summarize(detections, &StepTimes::features_ms))},
+          {"verification", to_json(summarize(detections, &StepTimes::verification_ms))}};
+}
+
+Json to_json(const DecisionCounts& score) {
+  return {{"positives", score.positives},  {"right", score.right},
+          {"tolerated", score.tolerated},  {"wrong", score.wrong},
+          {"ignored", score.ignored},      {"recall", score.recall()},
+          {"precision", score.precision()}};
+}
+
+Json to_json(const RunRecord& record, const std::vector<Detection>& detections) {
+  Json json{{"loopbit", kVersion},
+            {"input",
+             {{"path", record.input},
+              {"description", record.description},
+              {"every", record.every},
+              {"limit", record.limit}}},
+            {"stopped_by", record.stopped_by},
+            {"options", Json::parse(loopbit::to_json(record.options))},
+            {"machine", machine()},
+            {"threads", record.threads},
+            {"counts", counts(detections)},
+            {"times_ms", times(detections)},
+            {"wall_s", record.wall_s},
+            {"frames_per_s",
+             record.wall_s > 0 ? static_cast<double>(detections.size()) / record.wall_s : 0.0},
+            {"peak_memory_mib", peak_memory_mib()}};
+  if (record.score) json["score"] = to_json(*record.score);
+  return json;
+}
+
+/// Under another name first, so that a full disk leaves no half-written file.
+void write_whole(const fs::path& path, const std::string& text) {
+  const fs::path part = path.string() + ".part";
+  std::ofstream file(part);
+  file << text;
+  file.close();
+  std::error_code error;
+  if (file) fs::rename(part, path, error);
+  if (!file || error) {
+    const int reason = error ? error.value() : errno;
+    fs::remove(part, error);
+    throw_cannot_write(path, reason);
+  }
+}
+
+}  // namespace
+
+RunFolder::RunFolder(const std::string& path, bool overwrite) : path_(path) {
+  make_folder(path, overwrite);
+  const fs::path loops = fs::path(path) / kLoopsFile;
+  loops_.reset(std::fopen(loops.c_str(), "wx"));
+  if (!loops_) throw_cannot_write(loops, errno);
+  std::setvbuf(loops_.get(), nullptr, _IONBF, 0);
+  append(fmt::format("{}\n", kLoopsHeader));
+}
+
+void RunFolder::append(const std::string& row) {
+  if (std::fwrite(row.data(), 1, row.size(), loops_.get()) == row.size()) {
+    loops_bytes_ += static_cast<std::int64_t>(row.size());
+    return;
+  }
+  const int reason = errno;
+  // What went to disk of a row that did not fit would be taken for a whole one.
+  const bool cut = ftruncate(fileno(loops_.get()), loops_bytes_) == 0;
+  throw_cannot_write(fs::path(path_) / kLoopsFile, reason,
+                     cut ? fmt::format(" The {} rows before are kept.", detections_.size())
+                         : " Its last row is incomplete.");
+}
+
+void RunFolder::add(const Detection& detection) {
+  append(csv_row(detection));
+  detections_.push_back(detection);
+}
+
+void RunFolder::finish(const RunRecord& record) {
+  write_whole(fs::path(path_) / kRecordFile, to_json(record, detections_).dump(2) + '\n');
+}
+
+TimeSummary summarize(const std::vector<Detection>& detections, double StepTimes::*step) {
+  std::vector<double> times;
+  for (const Detection& detection : detections) {
+    if (detection.status != Status::unreadable) times.push_back(detection.times.*step);
+  }
+  if (times.empty()) return {};
+  std::sort(times.begin(), times.end());
+  double sum = 0;
+  for (const double time : times) sum += time;
+  const auto quantile = [&](double share) {
+    return times[static_cast<std::size_t>(share * static_cast<double>(times.size() - 1))];
+  };
+  return {sum / static_cast<double>(times.size()), quantile(0.5), quantile(0.99), times.back()};
+}
+
+}  // namespace loopbit

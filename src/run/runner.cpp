@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/runner.hpp"
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+namespace loopbit {
+namespace {
+
+/// Why `frame` cannot be used, or nothing.
+std::string fault(const Frame& frame, const std::optional<cv::Size>& size) {
+  if (!frame.error.empty() || !size || frame.image.size() == *size) return frame.error;
+  return fmt::format(
+      "'{}' has {} x {} pixels, but the run began with {} x {}; run images of "
+      "different cameras one by one.",
+      frame.name, frame.image.cols, frame.image.rows, size->width, size->height);
+}
+
+}  // namespace
+
+void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
+         const std::atomic<bool>& stop) {
+  std::optional<cv::Size> size;
+  const auto leave_out = [&](const Frame& frame, const std::string& reason) {
+    listener.on_bad_frame(fmt::format("Frame {}: {}", detector.size(), reason));
+    return detector.skip(frame.timestamp_s);
+  };
+  const auto detect = [&](const Frame& frame) {
+    if (const std::string reason = fault(frame, size); !reason.empty()) {
+      return leave_out(frame, reason);
+    }
+    try {
+      Detection detection = detector.process(frame.image, frame.timestamp_s);
+      size = frame.image.size();
+      return detection;
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::input) throw;
+      return leave_out(frame, fmt::format("'{}': {}", frame.name, error.what()));
+    }
+  };
+  for (Frame frame; !stop && source.next(frame);) listener.on_detection(detect(frame));
+}
+
+}  // namespace loopbit
