@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/world.hpp"
+#include "loopbit/world_dataset.hpp"
+
+#include "commands.hpp"
+#include "progress.hpp"
+#include "session.hpp"
+
+namespace loopbit::cli {
+namespace {
+
+struct DemoFlags {
+  SessionFlags session;
+  std::vector<std::string> world_settings;
+  std::string images;
+  WorldOptions world;
+};
+
+std::string describe(const World& world) {
+  const WorldOptions& options = world.options();
+  return fmt::format("built-in world, seed {}, {:.2f} laps of {:.0f} m", options.seed, options.laps,
+                     world.circuit_m());
+}
+
+void write_images(const World& world, const std::string& folder) {
+  {
+    Progress progress(static_cast<std::size_t>(world.options().frames));
+    write_dataset(world, folder, [&](int) { progress.advance(false); });
+  }
+  fmt::print(
+      "written    {0}/images ({1} frames of the {2}), {0}/truth.csv, {0}/not_false.csv, "
+      "{0}/poses.txt, {0}/times.txt\n",
+      folder, world.options().frames, describe(world));
+}
+
+int demo_command(const DemoFlags& flags) {
+  WorldOptions options = flags.world;
+  for (const std::string& setting : flags.world_settings) {
+    const auto [name, value] = split_setting(setting);
+    if (!set_field(options, "world", name, value)) {
+      throw Error(ErrorKind::option, fmt::format("There is no world setting '{}'; see 'loopbit "
+                                                 "demo --help'.",
+                                                 name));
+    }
+  }
+  const auto world = std::make_shared<const World>(options);
+  if (!flags.images.empty()) {
+    write_images(*world, flags.images);
+    return success;
+  }
+  Session session;
+  session.source = make_world_source(world);
+  session.input = "demo";
+  session.truth = GroundTruth{world->same_place(), world->near_place(), {}};
+  return run_session(std::move(session), flags.session);
+}
+
+std::string list_world_settings() {
+  std::string list = "World settings (--world NAME=VALUE):\n";
+  for_each_field<WorldOptions>([&](const auto& field) {
+    list += fmt::format("  {} = {}  [{} to {}] {}\n", field.name, WorldOptions{}.*field.member,
+                        field.min, field.max, field.help);
+  });
+  return list;
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app, int& exit_code) {
+  auto flags = std::make_shared<DemoFlags>();
+  CLI::App* command =
+      app.add_subcommand("demo", "Find the loops of a drive through the built-in world");
+  command->footer(list_world_settings());
+  flags->session.out = "loopbit_demo";
+  CLI::Option* out =
+      command->add_option("--out", flags->session.out, "Folder for loops.csv and run.json")
+          ->type_name("DIR")
+          ->capture_default_str();
+  flags->session.add_to(*command);
+  command->add_option("--frames", flags->world.frames, "Frames in the whole drive")
+      ->type_name("N")
+      ->capture_default_str();
+  command->add_option("--seed", flags->world.seed, "Another seed is another town")
+      ->type_name("S")
+      ->capture_default_str();
+  command->add_option("--world", flags->world_settings, "One setting of the world; may be repeated")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--write-images", flags->images,
+                   "Write the drive as a data set with its truth, and detect nothing")
+      ->type_name("DIR")
+      ->excludes(out);
+  command->callback([flags, &exit_code] { exit_code = demo_command(*flags); });
+}
+
+}  // namespace loopbit::cli

@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <cstdio>
+#include <exception>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <opencv2/core/utils/logger.hpp>
+
+#include "loopbit/error.hpp"
+#include "loopbit/version.hpp"
+
+#include "commands.hpp"
+
+namespace {
+
+using loopbit::ErrorKind;
+using namespace loopbit::cli;
+
+constexpr const char* kFooter =
+    "Exit codes: 0 done; 2 bad option or setting; 3 input missing or unreadable; 4 output cannot "
+    "be "
+    "written;\n130 interrupted, with what was found until then kept; 1 a fault in loopbit.";
+
+int exit_code_of(ErrorKind kind) {
+  switch (kind) {
+    case ErrorKind::option:
+      return bad_option;
+    case ErrorKind::input:
+      return bad_input;
+    case ErrorKind::output:
+      return bad_output;
+  }
+  return internal_error;
+}
+
+int run_command_line(int argc, char** argv) {
+  CLI::App app{"loopbit tells a robot, image by image, whether it has been here before."};
+  app.footer(kFooter);
+  app.set_version_flag("--version", loopbit::kVersion);
+  app.require_subcommand(1);
+  int exit_code = success;
+  add_run(app, exit_code);
+  add_demo(app, exit_code);
+  add_options(app);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? success : bad_option;
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  // Bad images are reported by loopbit, in its own words.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  try {
+    return run_command_line(argc, argv);
+  } catch (const loopbit::Error& error) {
+    fmt::print(stderr, "loopbit: {}\n", error.what());
+    return exit_code_of(error.kind());
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "loopbit: internal error, please report it: {}\n", error.what());
+    return internal_error;
+  }
+}

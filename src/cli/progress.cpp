@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "progress.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+namespace loopbit::cli {
+namespace {
+
+using std::chrono::duration;
+
+constexpr duration<double> kTerminalPause{0.1};
+constexpr duration<double> kPlainPause{5.0};
+constexpr std::size_t kBarWidth = 24;
+constexpr std::size_t kMaxReports = 10;
+
+std::string clock_time(double seconds) {
+  const auto whole = static_cast<long>(seconds + 0.5);
+  if (whole < 3600) return fmt::format("{}:{:02}", whole / 60, whole % 60);
+  return fmt::format("{}:{:02}:{:02}", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+}  // namespace
+
+Progress::Progress(std::optional<std::size_t> total)
+    : total_(total), on_terminal_(isatty(STDERR_FILENO) != 0) {}
+
+Progress::~Progress() {
+  clear_line();
+  if (reports_ > kMaxReports) {
+    fmt::print(stderr, "loopbit: {} frames were unreadable in all; loops.csv lists them.\n",
+               reports_);
+  }
+}
+
+void Progress::advance(bool is_loop) {
+  ++frames_;
+  if (is_loop) ++loops_;
+  const auto now = Clock::now();
+  if (now - last_shown_ < (on_terminal_ ? kTerminalPause : kPlainPause)) return;
+  last_shown_ = now;
+  clear_line();
+  fmt::print(stderr, "{}{}", line(), on_terminal_ ? "" : "\n");
+  std::fflush(stderr);
+}
+
+void Progress::report(const std::string& sentence) {
+  if (++reports_ > kMaxReports) return;
+  clear_line();
+  fmt::print(stderr, "loopbit: {}\n", sentence);
+}
+
+std::string Progress::line() const {
+  const double elapsed_s = duration<double>(Clock::now() - start_).count();
+  const double rate = static_cast<double>(frames_) / std::max(elapsed_s, 1e-9);
+  std::string text = on_terminal_ ? bar() : "";
+  text +=
+      total_ ? fmt::format("{} of {} frames", frames_, *total_) : fmt::format("{} frames", frames_);
+  text += fmt::format(", {:.1f} frames/s", rate);
+  if (total_ && *total_ >= frames_) {
+    text += fmt::format(", {} left", clock_time(static_cast<double>(*total_ - frames_) / rate));
+  }
+  return text + fmt::format(", {} loop{}", loops_, loops_ == 1 ? "" : "s");
+}
+
+std::string Progress::bar() const {
+  if (!total_ || *total_ == 0) return "";
+  const std::size_t full = std::min(kBarWidth, frames_ * kBarWidth / *total_);
+  return fmt::format("[{}{}] ", std::string(full, '#'), std::string(kBarWidth - full, '.'));
+}
+
+void Progress::clear_line() const {
+  if (on_terminal_) fmt::print(stderr, "\r\033[K");
+}
+
+}  // namespace loopbit::cli

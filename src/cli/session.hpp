@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "loopbit/ground_truth.hpp"
+#include "loopbit/image_source.hpp"
+#include "loopbit/loop_detector_options.hpp"
+
+namespace loopbit::cli {
+
+/// The flags that every command with a detector shares.
+struct SessionFlags {
+  std::string out;
+  bool overwrite = false;
+  std::string config;
+  std::vector<std::string> settings;  ///< "section.field=value"
+  int threads = 0;                    ///< 0 = one a core
+
+  void add_to(CLI::App& command);
+
+  /// The defaults, changed by the configuration file, then by single settings.
+  [[nodiscard]] LoopDetectorOptions detector_options() const;
+};
+
+/// What is to be run, and what is known about it.
+struct Session {
+  std::unique_ptr<ImageSource> source;
+  std::string input;  ///< for run.json and the summary
+  int every = 1;
+  int limit = 0;
+  std::optional<GroundTruth> truth;
+};
+
+/// Runs a detector over the session's images into the folder that `flags` names, with progress on
+/// stderr and a summary on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in order.
+/// Throws Error.
+int run_session(Session session, const SessionFlags& flags);
+
+/// "NAME=VALUE" in two. Throws Error (kind option) without a "=".
+std::pair<std::string, std::string> split_setting(const std::string& text);
+
+}  // namespace loopbit::cli

@@ -1,0 +1,63 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "summary.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace loopbit::cli {
+namespace {
+
+std::ptrdiff_t count(const std::vector<Detection>& detections, Status status) {
+  return std::count_if(detections.begin(), detections.end(),
+                       [&](const Detection& d) { return d.status == status; });
+}
+
+/// How often frames that found nothing did so, and what that means, most frequent first.
+void print_reasons(const std::vector<Detection>& detections) {
+  constexpr std::pair<Status, const char*> kReasons[] = {
+      {Status::no_earlier_place, "only recent places to compare with"},
+      {Status::no_similar_place, "no earlier place looks alike"},
+      {Status::few_matches, "no candidate shares enough features"},
+      {Status::no_geometry, "features match, but not as one rigid scene"},
+      {Status::low_score, "a geometry, but too little evidence"},
+      {Status::unreadable, "image unreadable"}};
+  for (const auto& [status, meaning] : kReasons) {
+    const auto frames = count(detections, status);
+    if (frames > 0) fmt::print("  {:>9} {} ({})\n", frames, meaning, to_string(status));
+  }
+}
+
+void print_score(const DecisionCounts& score) {
+  fmt::print(
+      "truth      {} of {} revisits found: recall {:.3f}; {} wrong loop{}: precision {:.3f}\n",
+      score.right, score.positives, score.recall(), score.wrong, score.wrong == 1 ? "" : "s",
+      score.precision());
+}
+
+void print_times(const RunRecord& record, const std::vector<Detection>& detections) {
+  const auto mean = [&](double StepTimes::*step) { return summarize(detections, step).mean; };
+  fmt::print(
+      "speed      {:.1f} frames/s with {} thread{}; a frame's mean: content {:.2f} ms, "
+      "retrieval {:.2f} ms, features {:.2f} ms, verification {:.2f} ms\n",
+      static_cast<double>(detections.size()) / std::max(record.wall_s, 1e-9), record.threads,
+      record.threads == 1 ? "" : "s", mean(&StepTimes::content_ms), mean(&StepTimes::retrieval_ms),
+      mean(&StepTimes::features_ms), mean(&StepTimes::verification_ms));
+}
+
+}  // namespace
+
+void print_summary(const RunRecord& record, const RunFolder& folder) {
+  const auto& detections = folder.detections();
+  fmt::print("input      {} ({}), {} frames{}\n", record.input, record.description,
+             detections.size(), record.stopped_by == "interrupt" ? ", then interrupted" : "");
+  const auto loops = count(detections, Status::loop);
+  fmt::print("loops      {} frame{} at a place seen before\n", loops, loops == 1 ? "" : "s");
+  print_reasons(detections);
+  if (record.score) print_score(*record.score);
+  print_times(record, detections);
+  fmt::print("written    {0}/loops.csv, {0}/run.json\n", folder.path());
+}
+
+}  // namespace loopbit::cli
