@@ -14,6 +14,6 @@ function(loopbit_part name)
     PUBLIC ${PART_LINKS}
     PRIVATE ${PART_PRIVATE_LINKS} loopbit_warnings)
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  list(TRANSFORM PART_HEADERS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/include/)
+  list(TRANSFORM PART_HEADERS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/include/loopbit/)
   install(FILES ${PART_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbit)
 endfunction()

@@ -98,6 +98,12 @@ cv::Mat1f squared_magnitude(const cv::Mat2f& map) {
   return magnitude;
 }
 
+int overlap(const BinaryContent& a, const BinaryContent& b) {
+  int set = 0;
+  for (std::size_t y = 0; y < a.rows.size(); ++y) set += std::popcount(a.rows[y] & b.rows[y]);
+  return set;
+}
+
 }  // namespace
 
 int count(const BinaryContent& content) {
@@ -130,11 +136,14 @@ BinaryContent shift_columns(const BinaryContent& content, int columns) {
   return shifted;
 }
 
-double similarity(const BinaryContent& a, const BinaryContent& b) {
-  int overlap = 0;
-  for (std::size_t y = 0; y < a.rows.size(); ++y) overlap += std::popcount(a.rows[y] & b.rows[y]);
+double similarity(const BinaryContent& a, const BinaryContent& b, int shift_tolerance_columns) {
   const int larger = std::max(count(a), count(b));
-  return larger == 0 ? 0.0 : static_cast<double>(overlap) / larger;
+  if (larger == 0) return 0.0;
+  int best = 0;
+  for (int columns = -shift_tolerance_columns; columns <= shift_tolerance_columns; ++columns) {
+    best = std::max(best, overlap(shift_columns(a, columns), b));
+  }
+  return static_cast<double>(best) / larger;
 }
 
 cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options) {

@@ -117,7 +117,10 @@ int run_session(Session session, const SessionFlags& flags) {
     drive(*session.source, folder, record.options);
     if (!stop_requested) check_readable(folder.detections(), session.input);
   } catch (const Error& error) {
-    finish(error.what());
+    try {
+      finish(error.what());
+    } catch (const Error&) {  // the disk that failed the run fails its record, too
+    }
     throw;
   }
   finish(stop_requested ? "interrupt" : "end");

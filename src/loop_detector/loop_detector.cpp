@@ -72,7 +72,8 @@ class LoopDetector::Impl {
     // Step 3 begins: features. They also tell how far back the present view reaches.
     seen.features = extract_surf(gray, options_.surf);
     detection.times.features_ms = stopwatch.lap_ms();
-    const PlaceId end = first_recent_place(seen, timestamp_s);
+    seen.look = look(seen);
+    const PlaceId end = first_recent_place(seen.look, timestamp_s);
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike.
@@ -91,13 +92,13 @@ class LoopDetector::Impl {
   void remember(Observation seen, std::optional<double> timestamp_s) {
     const PlaceId place = add_place(seen.content, std::move(seen.features), timestamp_s);
     recent_view_.remember(place, seen.look);
-    agreement_.remember(std::move(seen.verified));
+    if (seen.look.is_step) agreement_.remember(std::move(seen.verified));
   }
 
+  /// Never throws for its time, so that one bad frame cannot end a drive.
   PlaceId skip(std::optional<double> timestamp_s) {
-    check_time(timestamp_s);
-    agreement_.remember({});
-    return add_place(BinaryContent{}, Features{}, timestamp_s);
+    const double last_s = times_s_.empty() ? 0.0 : times_s_.back();
+    return add_place(BinaryContent{}, Features{}, std::max(last_s, timestamp_s.value_or(last_s)));
   }
 
   [[nodiscard]] PlaceId size() const { return index_.size(); }
@@ -134,35 +135,42 @@ class LoopDetector::Impl {
   [[nodiscard]] VerifiedCandidate verified(const Features& query,
                                            const Candidate& candidate) const {
     const Verification result = verify(query, features(candidate.place), options_.verification);
-    return {candidate, static_cast<int>(result.matches.size()),
-            static_cast<int>(result.inliers.size()), result.distinct_inliers};
+    return {candidate, recent_view_.step_of(candidate.place),
+            static_cast<int>(result.matches.size()), static_cast<int>(result.inliers.size()),
+            result.distinct_inliers};
   }
 
-  /// The end of the places that may be candidates; notes in `seen` how far back the view reaches.
-  [[nodiscard]] PlaceId first_recent_place(Observation& seen,
+  /// How far back the view of a new frame reaches.
+  [[nodiscard]] RecentView::Look look(const Observation& seen) const {
+    const bool is_step =
+        recent_view_.empty() ||
+        similarity(seen.content, index_.content(recent_view_.latest_step())) < kUnmovedSimilarity;
+    return recent_view_.look(size(), is_step, [&](PlaceId place) {
+      return is_window_fixed() ||
+             verified(seen.features, {place, 0}).inliers >= options_.exclusion.in_view_inliers;
+    });
+  }
+
+  [[nodiscard]] bool is_window_fixed() const {
+    return options_.exclusion.frames > 0 || options_.exclusion.seconds > 0;
+  }
+
+  /// The end of the places that may be candidates: the exclusion window begins there.
+  [[nodiscard]] PlaceId first_recent_place(const RecentView::Look& look,
                                            std::optional<double> timestamp_s) const {
     const ExclusionOptions& exclusion = options_.exclusion;
-    const PlaceId latest = std::max(0, size() - exclusion.min_frames);
-    if (exclusion.frames > 0) return std::min(latest, std::max(0, size() - exclusion.frames));
+    PlaceId first = look.begin;
+    if (exclusion.frames > 0) first = size() - exclusion.frames;
     if (exclusion.seconds > 0) {
       const auto recent =
           std::upper_bound(times_s_.begin(), times_s_.end(), *timestamp_s - exclusion.seconds);
-      return std::min(latest, static_cast<PlaceId>(recent - times_s_.begin()));
+      first = static_cast<PlaceId>(recent - times_s_.begin());
     }
-    const bool moved =
-        recent_view_.empty() ||
-        similarity(seen.content, index_.content(recent_view_.latest_step())) < kUnmovedSimilarity;
-    seen.look = recent_view_.look(size(), moved, [&](PlaceId place) {
-      return verified(seen.features, {place, 0}).inliers >= exclusion.in_view_inliers;
-    });
-    return std::min(latest, seen.look.begin);
+    return std::max(0, std::min(first, size() - exclusion.min_frames));
   }
 
-  [[nodiscard]] bool is_better(const VerifiedCandidate& a, const VerifiedCandidate& b) const {
-    const auto rank = [&](const VerifiedCandidate& v) {
-      return std::tuple(agreement_.score(v), v.matches, v.candidate.similarity);
-    };
-    return rank(a) > rank(b);
+  [[nodiscard]] auto rank(const VerifiedCandidate& v, const Observation& seen) const {
+    return std::tuple(agreement_.score(v, seen.look.is_step), v.matches, v.candidate.similarity);
   }
 
   /// Candidates stand apart; the best place of all may be a neighbour of one. Verifies those of an
@@ -174,9 +182,10 @@ class LoopDetector::Impl {
     for (PlaceId place = std::max(0, middle - radius); place <= std::min(end - 1, middle + radius);
          ++place) {
       if (place == middle) continue;
-      const double xi = similarity(seen.content, index_.content(place));
+      const double xi = similarity(seen.content, index_.content(place),
+                                   options_.retrieval.shift_tolerance_columns);
       const VerifiedCandidate neighbour = verified(seen.features, {place, xi});
-      if (is_better(neighbour, best)) best = neighbour;
+      if (rank(neighbour, seen) > rank(best, seen)) best = neighbour;
     }
     return best;
   }
@@ -186,13 +195,15 @@ class LoopDetector::Impl {
       detection.status = end == 0 ? Status::no_earlier_place : Status::no_similar_place;
       return;
     }
-    auto best = *std::min_element(seen.verified.begin(), seen.verified.end(),
-                                  [&](const auto& a, const auto& b) { return is_better(a, b); });
-    const auto accepted = [&] { return agreement_.score(best) >= options_.decision.min_score; };
+    auto best = *std::max_element(
+        seen.verified.begin(), seen.verified.end(),
+        [&](const auto& a, const auto& b) { return rank(a, seen) < rank(b, seen); });
+    const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
+    const auto accepted = [&] { return score() >= options_.decision.min_score; };
     if (accepted()) best = refined(best, seen, end);
     detection.status = accepted() ? Status::loop : reason_of_rejection(best, options_.verification);
     detection.match = best.candidate.place;
-    detection.score = agreement_.score(best);
+    detection.score = score();
     detection.similarity = best.candidate.similarity;
     detection.matches = best.matches;
     detection.inliers = best.inliers;

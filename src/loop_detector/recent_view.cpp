@@ -33,4 +33,8 @@ void RecentView::remember(PlaceId newest, const Look& look) {
   far_step_ = look.far_step;
 }
 
+std::ptrdiff_t RecentView::step_of(PlaceId place) const {
+  return std::upper_bound(steps_.begin(), steps_.end(), place) - steps_.begin() - 1;
+}
+
 }  // namespace loopbit

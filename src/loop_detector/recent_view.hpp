@@ -38,6 +38,9 @@ class RecentView {
   [[nodiscard]] bool empty() const { return steps_.empty(); }
   [[nodiscard]] PlaceId latest_step() const { return steps_.back(); }
 
+  /// Where along the path `place` lies, counted in steps.
+  [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
+
  private:
   std::vector<PlaceId> steps_;
   std::size_t far_step_ = 0;

@@ -41,7 +41,7 @@ struct ExclusionOptions {
 /// The one rule that accepts a match: score >= min_score.
 struct DecisionOptions {
   double min_score = 18.0;
-  int agreement_frames = 2;
+  int agreement_steps = 2;
   double agreement_weight = 0.5;
   int chance_inliers = 8;
 
@@ -49,10 +49,10 @@ struct DecisionOptions {
     using S = DecisionOptions;
     return std::tuple{
         Field{"min_score", &S::min_score, 0.0, 1e9, "smallest score of an accepted match"},
-        Field{"agreement_frames", &S::agreement_frames, 0, 100,
-              "frames just before the query that can support its match; 0 = each frame on its own"},
+        Field{"agreement_steps", &S::agreement_steps, 0, 100,
+              "changes of view just before the query that can support its match; 0 = each frame alone"},
         Field{"agreement_weight", &S::agreement_weight, 0.0, 1.0,
-              "what a supporting frame's distinct inlier adds to the score; one of the query's "
+              "what a supporting view's distinct inlier adds to the score; one of the query's "
               "adds 1"},
         Field{"chance_inliers", &S::chance_inliers, 0, 100,
               "distinct inliers that different places share by chance; fewer support nothing"}};
