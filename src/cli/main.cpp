@@ -34,6 +34,16 @@ int exit_code_of(ErrorKind kind) {
   return internal_error;
 }
 
+/// CLI11 says of an unknown command only that one is required.
+void check_command(const CLI::App& app, int argc, char** argv) {
+  if (argc < 2 || argv[1][0] == '-') return;
+  const auto is_named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
+  if (!app.get_subcommands(is_named).empty()) return;
+  throw loopbit::Error(
+      ErrorKind::option,
+      fmt::format("There is no command '{}'; see 'loopbit --help' for those there are.", argv[1]));
+}
+
 int run_command_line(int argc, char** argv) {
   CLI::App app{"loopbit tells a robot, image by image, whether it has been here before."};
   app.footer(kFooter);
@@ -43,6 +53,7 @@ int run_command_line(int argc, char** argv) {
   add_run(app, exit_code);
   add_demo(app, exit_code);
   add_options(app);
+  check_command(app, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

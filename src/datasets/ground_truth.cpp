@@ -4,7 +4,6 @@
 
 #include <cerrno>
 #include <charconv>
-#include <cstring>
 #include <fstream>
 #include <optional>
 #include <string_view>
@@ -65,11 +64,7 @@ void write_place_runs(const std::string& path, const std::string& comment,
   fmt::print(file, "# {}\n", comment);
   for (const PlaceRun& run : runs) fmt::print(file, "{},{},{}\n", run.query, run.first, run.last);
   file.close();
-  if (!file) {
-    throw Error(ErrorKind::output, fmt::format("Cannot write '{}' ({}); check the folder, its "
-                                               "permissions and the free space.",
-                                               path, std::strerror(errno)));
-  }
+  if (!file) throw cannot_write(path, errno);
 }
 
 }  // namespace loopbit

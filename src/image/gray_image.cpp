@@ -18,7 +18,11 @@ void check(const cv::Mat& image) {
   if (image.empty()) {
     throw Error(ErrorKind::input, "The image is empty; give one of at least 32 x 32 pixels.");
   }
-  if (image.dims != 2 || image.cols < kMinImageSidePx || image.rows < kMinImageSidePx) {
+  if (image.dims != 2) {
+    throw Error(ErrorKind::input,
+                fmt::format("The image has {} dimensions; give one of 2.", image.dims));
+  }
+  if (image.cols < kMinImageSidePx || image.rows < kMinImageSidePx) {
     throw Error(ErrorKind::input,
                 fmt::format("The image has {} x {} pixels; at least {} x {} are needed.",
                             image.cols, image.rows, kMinImageSidePx, kMinImageSidePx));

@@ -31,7 +31,7 @@ std::vector<const Kernels*> kernels_of_this_processor() {
 const Kernels& choose() {
   const auto kernels = available_kernels();
   const char* forced = std::getenv("LOOPBIT_KERNEL");
-  if (forced == nullptr) return *kernels.back();
+  if (forced == nullptr || *forced == '\0') return *kernels.back();
   const auto found =
       std::find_if(kernels.begin(), kernels.end(), [&](auto* k) { return k->name == forced; });
   if (found != kernels.end()) return **found;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/gray_image.hpp"
+#include "loopbit/kernels.hpp"
 
 #include "agreement.hpp"
 #include "recent_view.hpp"
@@ -47,6 +49,7 @@ class LoopDetector::Impl {
   explicit Impl(const LoopDetectorOptions& options)
       : options_(options), agreement_(options.decision) {
     validate(options);
+    (void)active_kernels();  // a kernel that cannot be had is an error now, not at the first frame
   }
 
   /// One frame as the detector sees it: all that remember() needs.
@@ -98,7 +101,8 @@ class LoopDetector::Impl {
   /// Never throws for its time, so that one bad frame cannot end a drive.
   PlaceId skip(std::optional<double> timestamp_s) {
     const double last_s = times_s_.empty() ? 0.0 : times_s_.back();
-    return add_place(BinaryContent{}, Features{}, std::max(last_s, timestamp_s.value_or(last_s)));
+    const bool is_usable = timestamp_s && std::isfinite(*timestamp_s) && *timestamp_s > last_s;
+    return add_place(BinaryContent{}, Features{}, is_usable ? *timestamp_s : last_s);
   }
 
   [[nodiscard]] PlaceId size() const { return index_.size(); }
@@ -111,13 +115,13 @@ class LoopDetector::Impl {
 
   void check_time(std::optional<double> timestamp_s) const {
     if (options_.exclusion.seconds <= 0) return;
-    if (!timestamp_s) {
+    if (!timestamp_s || !std::isfinite(*timestamp_s)) {
       throw Error(ErrorKind::input,
-                  fmt::format("Frame {} has no timestamp, but exclusion.seconds is {}; give times, "
-                              "or set exclusion.frames in its place.",
+                  fmt::format("Frame {} has no usable timestamp, but exclusion.seconds is {}; give "
+                              "times, or set exclusion.frames in its place.",
                               size(), options_.exclusion.seconds));
     }
-    if (!times_s_.empty() && !(*timestamp_s >= times_s_.back())) {
+    if (!times_s_.empty() && *timestamp_s < times_s_.back()) {
       throw Error(ErrorKind::input,
                   fmt::format("Frame {} has timestamp {} s, before the last one of {} s; give the "
                               "frames in order of time.",

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <fstream>
-#include <sstream>
+#include <string>
 #include <type_traits>
 
 #include <fmt/format.h>
@@ -25,7 +25,8 @@ void for_each_setting(LoopDetectorOptions& options, Visit&& visit) {
   });
 }
 
-std::string parse_context(const Json::parse_error& error) {
+/// Where and why, without the library's own codes.
+std::string parse_context(const Json::exception& error) {
   const std::string what = error.what();
   const auto colon = what.find("at line");
   return colon == std::string::npos ? what : what.substr(colon);
@@ -96,7 +97,7 @@ LoopDetectorOptions options_from_json(const std::string& json, const std::string
     }
     set_all(options, parsed);
     validate(options);
-  } catch (const Json::parse_error& error) {
+  } catch (const Json::exception& error) {
     throw Error(ErrorKind::option,
                 fmt::format("{} is not valid JSON: {}.", source, parse_context(error)));
   } catch (const Error& error) {
@@ -107,13 +108,14 @@ LoopDetectorOptions options_from_json(const std::string& json, const std::string
 
 LoopDetectorOptions load_options(const std::string& path) {
   std::ifstream file(path);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) {
+  std::string text;
+  std::getline(file, text, '\0');
+  if (!file.is_open() || file.bad()) {
     throw Error(
         ErrorKind::input,
         fmt::format("Cannot read the settings file '{}'; check its name and permissions.", path));
   }
-  return options_from_json(text.str(), path);
+  return options_from_json(text, path);
 }
 
 std::vector<OptionInfo> list_options() {

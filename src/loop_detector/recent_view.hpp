@@ -28,7 +28,7 @@ class RecentView {
   };
 
   /// `newest`: the number of the new frame. `is_step`: it differs from latest_step() in looks.
-  /// `in_view(place)`: it shares geometry with that place; asked at most three times.
+  /// `in_view(place)`: it shares geometry with that place; asked at most twice.
   [[nodiscard]] Look look(PlaceId newest, bool is_step,
                           const std::function<bool(PlaceId)>& in_view) const;
 

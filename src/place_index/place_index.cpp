@@ -3,7 +3,6 @@
 #include "loopbit/place_index.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cstdlib>
 
 #include "loopbit/kernels.hpp"
@@ -61,7 +60,7 @@ const BinaryContent& PlaceIndex::content(PlaceId place) const {
 std::vector<Candidate> PlaceIndex::query(const BinaryContent& content, PlaceId end,
                                          const RetrievalOptions& options) const {
   validate(options, "retrieval");
-  assert(end <= size());
+  end = std::min(end, size());
   const int query_count = count(content);
   if (end <= 0 || query_count == 0) return {};
 

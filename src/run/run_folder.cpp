@@ -4,10 +4,8 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
-#include <string_view>
 #include <system_error>
 #include <thread>
 
@@ -30,17 +28,10 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kLoopsFile = "loops.csv";
 constexpr const char* kRecordFile = "run.json";
 
-[[noreturn]] void throw_cannot_write(const fs::path& path, int error, std::string_view kept = "") {
-  throw Error(ErrorKind::output,
-              fmt::format("Cannot write '{}': {}; check the folder, its permissions and the free "
-                          "space.{}",
-                          path.string(), std::strerror(error), kept));
-}
-
 void make_folder(const fs::path& folder, bool overwrite) {
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw_cannot_write(folder, error.value());
+  if (error) throw cannot_write(folder.string(), error.value());
   for (const char* name : {kLoopsFile, kRecordFile}) {
     if (!fs::exists(folder / name)) continue;
     if (!overwrite) {
@@ -49,7 +40,8 @@ void make_folder(const fs::path& folder, bool overwrite) {
                               "--overwrite to replace it.",
                               folder.string(), name));
     }
-    if (!fs::remove(folder / name, error)) throw_cannot_write(folder / name, error.value());
+    if (!fs::remove(folder / name, error))
+      throw cannot_write((folder / name).string(), error.value());
   }
 }
 
@@ -146,7 +138,7 @@ void write_whole(const fs::path& path, const std::string& text) {
   if (!file || error) {
     const int reason = error ? error.value() : errno;
     fs::remove(part, error);
-    throw_cannot_write(path, reason);
+    throw cannot_write(path.string(), reason);
   }
 }
 
@@ -156,7 +148,7 @@ RunFolder::RunFolder(const std::string& path, bool overwrite) : path_(path) {
   make_folder(path, overwrite);
   const fs::path loops = fs::path(path) / kLoopsFile;
   loops_.reset(std::fopen(loops.c_str(), "wx"));
-  if (!loops_) throw_cannot_write(loops, errno);
+  if (!loops_) throw cannot_write(loops.string(), errno);
   std::setvbuf(loops_.get(), nullptr, _IONBF, 0);
   append(fmt::format("{}\n", kLoopsHeader));
 }
@@ -169,7 +161,7 @@ void RunFolder::append(const std::string& row) {
   const int reason = errno;
   // What went to disk of a row that did not fit would be taken for a whole one.
   const bool cut = ftruncate(fileno(loops_.get()), loops_bytes_) == 0;
-  throw_cannot_write(fs::path(path_) / kLoopsFile, reason,
+  throw cannot_write((fs::path(path_) / kLoopsFile).string(), reason,
                      cut ? fmt::format(" The {} rows before are kept.", detections_.size())
                          : " Its last row is incomplete.");
 }

@@ -3,6 +3,7 @@
 #include "loopbit/verification.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -36,7 +37,7 @@ struct Nearest {
   }
 
   [[nodiscard]] bool is_distinct(double max_ratio) const {
-    return distance_sq <= max_ratio * max_ratio * second_distance_sq;
+    return distance_sq < max_ratio * max_ratio * second_distance_sq;
   }
 };
 
@@ -94,6 +95,32 @@ std::vector<cv::Point2f> positions(const Features& features, const std::vector<M
   return points;
 }
 
+std::vector<Match> ransac_inliers(const Features& query, const Features& place,
+                                  const std::vector<Match>& matches, double max_error_px) {
+  std::vector<std::uint8_t> is_inlier;
+  // MAGSAC++ (Barath et al., CVPR 2020); OpenCV seeds it with the same constant at every call.
+  cv::findFundamentalMat(positions(query, matches, &Match::query),
+                         positions(place, matches, &Match::place), cv::USAC_MAGSAC, max_error_px,
+                         kRansacConfidence, kRansacIterations, is_inlier);
+  std::vector<Match> inliers;
+  for (std::size_t i = 0; i < is_inlier.size(); ++i) {
+    if (is_inlier[i] != 0) inliers.push_back(matches[i]);
+  }
+  return inliers;
+}
+
+/// The matches that a camera standing where it stood would see: a geometry, too, but one that no
+/// fundamental matrix is determined by, so that RANSAC finds none.
+std::vector<Match> unmoved_matches(const Features& query, const Features& place,
+                                   std::vector<Match> matches, double max_error_px) {
+  std::erase_if(matches, [&](const Match& match) {
+    const Keypoint& a = keypoint(query, match.query);
+    const Keypoint& b = keypoint(place, match.place);
+    return std::hypot(a.x_px - b.x_px, a.y_px - b.y_px) > max_error_px;
+  });
+  return matches;
+}
+
 bool overlap(const Keypoint& a, const Keypoint& b, double min_spacing_scales) {
   const double dx = a.x_px - b.x_px;
   const double dy = a.y_px - b.y_px;
@@ -118,16 +145,9 @@ std::vector<Match> match_features(const Features& query, const Features& place, 
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
                                     const std::vector<Match>& matches, double max_error_px) {
   if (matches.size() < kMinMatchesForGeometry) return {};
-  std::vector<std::uint8_t> is_inlier;
-  // MAGSAC++ (Barath et al., CVPR 2020); OpenCV seeds it with the same constant at every call.
-  cv::findFundamentalMat(positions(query, matches, &Match::query),
-                         positions(place, matches, &Match::place), cv::USAC_MAGSAC, max_error_px,
-                         kRansacConfidence, kRansacIterations, is_inlier);
-  std::vector<Match> inliers;
-  for (std::size_t i = 0; i < is_inlier.size(); ++i) {
-    if (is_inlier[i] != 0) inliers.push_back(matches[i]);
-  }
-  return inliers;
+  auto moved = ransac_inliers(query, place, matches, max_error_px);
+  auto unmoved = unmoved_matches(query, place, matches, max_error_px);
+  return unmoved.size() > moved.size() ? unmoved : moved;
 }
 
 int distinct_inliers(const Features& query, const Features& place,

@@ -4,7 +4,6 @@
 
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
@@ -20,17 +19,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void throw_cannot_write(const fs::path& path, int error) {
-  throw Error(ErrorKind::output,
-              fmt::format("Cannot write '{}': {}; check the folder, its permissions and the free "
-                          "space.",
-                          path.string(), std::strerror(error)));
-}
-
 void make_image_folder(const fs::path& images) {
   std::error_code error;
   fs::create_directories(images, error);
-  if (error) throw_cannot_write(images, error.value());
+  if (error) throw cannot_write(images.string(), error.value());
   if (!fs::is_empty(images, error)) {
     throw Error(ErrorKind::output, fmt::format("'{}' is not empty; name another folder for the "
                                                "images.",
@@ -45,7 +37,7 @@ void write_image(const fs::path& path, const cv::Mat& image) {
   file.write(reinterpret_cast<const char*>(bytes.data()),
              static_cast<std::streamsize>(bytes.size()));
   file.close();
-  if (!file) throw_cannot_write(path, errno);
+  if (!file) throw cannot_write(path.string(), errno);
 }
 
 /// The camera looks along its z axis; the world's x is east, its z north and its y down.
@@ -61,7 +53,7 @@ void write_rows(const fs::path& path, int frames, const RowOf& row_of) {
   std::ofstream file(path);
   for (int frame = 0; frame < frames; ++frame) file << row_of(frame);
   file.close();
-  if (!file) throw_cannot_write(path, errno);
+  if (!file) throw cannot_write(path.string(), errno);
 }
 
 }  // namespace

@@ -26,4 +26,8 @@ class Error : public std::runtime_error {
   ErrorKind kind_;
 };
 
+/// The Error (kind output) of a file or folder that cannot be written: its name, the reason that
+/// `errno_value` stands for, the remedy, and what is `kept`, if there is something to say of that.
+Error cannot_write(const std::string& path, int errno_value, const std::string& kept = "");
+
 }  // namespace loopbit

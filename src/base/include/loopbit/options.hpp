@@ -61,8 +61,8 @@ void parse_value(const std::string& text, const std::string& name, int& value);
 void parse_value(const std::string& text, const std::string& name, double& value);
 void parse_value(const std::string& text, const std::string& name, bool& value);
 
-/// Sets the field called `name`; false if there is none. Throws Error (kind option) if `text` is not
-/// of its type or out of its range, and leaves it as it was.
+/// Sets the field called `name`; false if there is none. Throws Error (kind option) if `text` is
+/// not of its type or out of its range, and leaves it as it was.
 template <typename Struct>
 bool set_field(Struct& options, std::string_view section, std::string_view name,
                const std::string& text) {

@@ -34,9 +34,9 @@ struct BinaryContent {
 /// The content moved `columns` to the right (left if negative); what leaves the map is lost.
 [[nodiscard]] BinaryContent shift_columns(const BinaryContent& content, int columns);
 
-/// xi(O1, O2) = |O1 & O2| / max(|O1|, |O2|), in [0, 1]; 0 if either is empty. With a shift tolerance,
-/// the largest over all shifts of `a` by up to so many columns; |O1| is counted before shifting.
-/// Wang et al. 2019, section III-B.
+/// xi(O1, O2) = |O1 & O2| / max(|O1|, |O2|), in [0, 1]; 0 if either is empty. With a shift
+/// tolerance, the largest over all shifts of `a` by up to so many columns; |O1| is counted before
+/// shifting. Wang et al. 2019, section III-B.
 [[nodiscard]] double similarity(const BinaryContent& a, const BinaryContent& b,
                                 int shift_tolerance_columns = 0);
 

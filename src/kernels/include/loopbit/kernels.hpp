@@ -19,7 +19,7 @@ inline constexpr std::size_t kDescriptorSize = 64;
 struct Kernels {
   std::string_view name;
 
-  /// overlaps[i] = max over q of |queries[q] & places[i]|, each content 64 words, in any alignment.
+  /// overlaps[i] = max over q of |queries[q] & places[i]|, each content 64 words.
   /// Cost: num_queries * num_places * 512 bytes of AND and popcount.
   void (*max_overlaps)(const std::uint64_t* queries, std::size_t num_queries,
                        const std::uint64_t* places, std::size_t num_places,
@@ -33,8 +33,9 @@ struct Kernels {
 /// The kernels this processor can run, slowest first: "scalar", "avx2", "avx512".
 std::span<const Kernels* const> available_kernels();
 
-/// The fastest of them, or the one that the environment variable LOOPBIT_KERNEL names when it is
-/// first called. Throws Error (kind option) if that one is unknown or cannot run here.
+/// The fastest of them, or the one that the environment variable LOOPBIT_KERNEL names (unless
+/// empty) when it is first called. Throws Error (kind option) if that one is unknown or cannot run
+/// here.
 const Kernels& active_kernels();
 
 }  // namespace loopbit

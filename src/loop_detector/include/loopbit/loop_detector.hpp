@@ -26,6 +26,9 @@ class LoopDetector {
   /// Throws Error (kind option) if `options` are not valid.
   explicit LoopDetector(const LoopDetectorOptions& options = {});
   ~LoopDetector();
+  LoopDetector(const LoopDetector&) = delete;
+  LoopDetector& operator=(const LoopDetector&) = delete;
+  /// A detector moved from may only be assigned to or destroyed.
   LoopDetector(LoopDetector&&) noexcept;
   LoopDetector& operator=(LoopDetector&&) noexcept;
 

@@ -48,9 +48,10 @@ struct DecisionOptions {
   static constexpr auto fields() {
     using S = DecisionOptions;
     return std::tuple{
-        Field{"min_score", &S::min_score, 0.0, 1e9, "smallest score of an accepted match"},
+        Field{"min_score", &S::min_score, 1.0, 1e9, "smallest score of an accepted match"},
         Field{"agreement_steps", &S::agreement_steps, 0, 100,
-              "changes of view just before the query that can support its match; 0 = each frame alone"},
+              "changes of view just before the query that can support its match; 0 = each frame "
+              "alone"},
         Field{"agreement_weight", &S::agreement_weight, 0.0, 1.0,
               "what a supporting view's distinct inlier adds to the score; one of the query's "
               "adds 1"},

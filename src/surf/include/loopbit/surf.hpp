@@ -55,8 +55,9 @@ struct SurfOptions {
 /// SURF features of `gray`, 8 bits, at least 32 x 32 pixels.
 ///
 /// Bay, Tuytelaars, Van Gool, "SURF: Speeded Up Robust Features", ECCV 2006. The response threshold
-/// is so low that only the budget of keypoints decides: dim and low-texture images need no setting.
-/// Deterministic. Cost: about 10 ns a working pixel and 12 us a keypoint.
+/// is a thirtieth of the customary one, so that the budget of keypoints decides on most images; dim
+/// or blurred ones have fewer. Deterministic. Cost: about 10 ns a working pixel and 12 us a
+/// keypoint.
 Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options = {});
 
 }  // namespace loopbit

@@ -30,7 +30,7 @@ struct VerificationOptions {
     using S = VerificationOptions;
     return std::tuple{
         Field{"max_ratio", &S::max_ratio, 0.1, 1.0,
-              "a match is kept if its distance is at most this part of the second best"},
+              "a match is kept if its distance is less than this part of the second best"},
         Field{"min_matches", &S::min_matches, 8, 1000, "with fewer matches no geometry is sought"},
         Field{"max_epipolar_error_px", &S::max_epipolar_error_px, 0.1, 50.0,
               "an inlier lies at most this far from its epipolar line, working pixels"},
@@ -48,12 +48,14 @@ struct Verification {
 
 /// Mutual best matches by the distance of descriptors that pass the ratio test from either side;
 /// only features with the same sign of the Laplacian are compared. Each feature is in one match at
-/// most: one-way matches gather on few points and fake inliers. Ties go to the lower index. A
-/// feature that has nothing to be second to is distinct. Cost: half of query times place features.
+/// most: one-way matches gather on few points and fake inliers. Equally near features are ambiguous
+/// and match nothing. A feature that has nothing to be second to is distinct. Cost: half of query
+/// times place features.
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio);
 
 /// The largest set of `matches` found that one fundamental matrix explains, by RANSAC with a fixed
-/// seed; empty below 8 matches, as 7 always fit. The same input gives the same inliers.
+/// seed, or that did not move at all; empty below 8 matches, as 7 always fit. The same input gives
+/// the same inliers.
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
                                     const std::vector<Match>& matches, double max_error_px);
 

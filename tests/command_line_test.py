@@ -1,0 +1,381 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""The loopbit command as a user meets it: what it writes, says and exits with.
+
+    command_line_test.py LOOPBIT [unittest arguments]
+"""
+
+import csv
+import json
+import os
+import pathlib
+import pty
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+LOOPBIT = pathlib.Path(sys.argv.pop(1)).resolve()
+HEADER = (
+    "frame,timestamp,status,match,score,similarity,matches,inliers,"
+    "content_ms,retrieval_ms,features_ms,verification_ms"
+)
+# A small town: two laps of a short circuit, in pictures that are quick to draw.
+FRAMES = 150
+WORLD = ["--frames", FRAMES, "--world", "laps=2", "--world", "spacing_m=1.5",
+         "--world", "width_px=320", "--world", "height_px=240"]
+
+
+def loopbit(*arguments, environment=None, **options):
+    return subprocess.run(
+        [LOOPBIT, *map(str, arguments)],
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        env={**os.environ, **(environment or {})},
+        **options,
+    )
+
+
+def rows(folder):
+    with open(folder / "loops.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def decisions(folder):
+    """loops.csv without the times, which differ from run to run."""
+    return [{k: v for k, v in row.items() if not k.endswith("_ms")} for row in rows(folder)]
+
+
+class CommandLineTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="loopbit_cli_"))
+        cls.dataset = cls.shared / "dataset"
+        made = loopbit("demo", *WORLD, "--write-images", cls.dataset)
+        assert made.returncode == 0, made.stderr
+        cls.images = cls.dataset / "images"
+        cls.reference = cls.shared / "reference"
+        ran = loopbit("run", cls.images, "--out", cls.reference, "--truth",
+                      cls.dataset / "truth.csv", "--not-false", cls.dataset / "not_false.csv")
+        assert ran.returncode == 0, ran.stderr
+        cls.reference_output = ran.stdout
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.shared)
+
+    def setUp(self):
+        self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="case_", dir=self.shared))
+        self.out = self.scratch / "out"
+
+    def few_images(self, number=14):
+        """A folder with the first images of the world."""
+        folder = self.scratch / "few"
+        folder.mkdir()
+        for image in sorted(self.images.iterdir())[:number]:
+            shutil.copy(image, folder)
+        return folder
+
+    def assert_fails(self, result, code, *words):
+        self.assertEqual(result.returncode, code, result.stderr)
+        for word in words:
+            self.assertIn(str(word), result.stderr)
+        sentences = [line for line in result.stderr.splitlines() if line.startswith("loopbit: ")]
+        self.assertEqual(len(sentences), 1, result.stderr)
+
+    # What a run leaves.
+
+    def test_loops_csv_has_the_documented_header_and_a_row_a_frame(self):
+        lines = (self.reference / "loops.csv").read_text().splitlines()
+        self.assertEqual(lines[0], HEADER)
+        self.assertEqual([row["frame"] for row in rows(self.reference)],
+                         [str(n) for n in range(FRAMES)])
+
+    def test_rows_explain_their_decision(self):
+        options = json.loads((self.reference / "run.json").read_text())["options"]
+        for row in rows(self.reference):
+            accepted = float(row["score"]) >= options["decision"]["min_score"]
+            self.assertEqual(row["status"] == "loop", accepted, row)
+            self.assertEqual(row["match"] == "",
+                             row["status"] in ("no_earlier_place", "no_similar_place"), row)
+            self.assertGreaterEqual(int(row["matches"]), int(row["inliers"]))
+
+    def test_the_world_is_recognised(self):
+        score = json.loads((self.reference / "run.json").read_text())["score"]
+        self.assertGreaterEqual(score["precision"], 0.98)
+        self.assertGreater(score["recall"], 0.5)
+        self.assertIn(f"recall {score['recall']:.3f}", self.reference_output)
+
+    def test_run_json_agrees_with_loops_csv(self):
+        record = json.loads((self.reference / "run.json").read_text())
+        self.assertEqual(record["counts"]["frames"], FRAMES)
+        for status, number in record["counts"]["by_status"].items():
+            self.assertEqual(number, sum(r["status"] == status for r in rows(self.reference)))
+        for step in ("content", "retrieval", "features", "verification"):
+            column = [float(r[f"{step}_ms"]) for r in rows(self.reference)]
+            self.assertAlmostEqual(record["times_ms"][step]["mean"], sum(column) / FRAMES, places=2)
+            self.assertAlmostEqual(record["times_ms"][step]["max"], max(column), places=2)
+        self.assertEqual(record["stopped_by"], "end")
+        self.assertGreater(record["peak_memory_mib"], 1)
+
+    def test_threads_and_instruction_set_change_no_decision(self):
+        variants = {
+            "one thread": (["--threads", "1"], {}),
+            "scalar": (["--threads", "3"], {"LOOPBIT_KERNEL": "scalar"}),
+            "plain OpenCV": ([], {"OPENCV_CPU_DISABLE": "SSE4.1,SSE4.2,AVX,FP16,AVX2,AVX512-SKX",
+                                  "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-AVX512F"}),
+        }
+        for name, (flags, environment) in variants.items():
+            with self.subTest(name):
+                out = self.scratch / name
+                ran = loopbit("run", self.images, "--out", out, *flags, environment=environment)
+                self.assertEqual(ran.returncode, 0, ran.stderr)
+                self.assertEqual(decisions(out), decisions(self.reference))
+
+    def test_demo_finds_what_its_images_show(self):
+        ran = loopbit("demo", *WORLD, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        without_time = [{**row, "timestamp": ""} for row in decisions(self.out)]
+        self.assertEqual(without_time, decisions(self.reference))
+
+    def test_every_and_limit(self):
+        ran = loopbit("run", self.images, "--out", self.out, "--every", 3, "--limit", 5)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(len(rows(self.out)), 5)
+
+    def test_settings_from_file_and_by_name(self):
+        config = self.scratch / "settings.json"
+        config.write_text('{"decision": {"min_score": 1000.0}, // nothing passes\n'
+                          ' "surf": {"max_keypoints": 100}}')
+        ran = loopbit("run", self.few_images(), "--out", self.out, "--config", config,
+                      "--set", "surf.max_keypoints=200")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        options = json.loads((self.out / "run.json").read_text())["options"]
+        self.assertEqual(options["decision"]["min_score"], 1000.0)
+        self.assertEqual(options["surf"]["max_keypoints"], 200)
+
+    def test_printed_settings_are_a_settings_file(self):
+        config = self.scratch / "settings.json"
+        config.write_text(loopbit("options", "--json").stdout)
+        ran = loopbit("run", self.few_images(), "--out", self.out, "--config", config)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(json.loads((self.out / "run.json").read_text())["options"],
+                         json.loads(config.read_text()))
+
+    def test_progress_is_a_bar_on_a_terminal(self):
+        leader, follower = pty.openpty()
+        subprocess.run([LOOPBIT, "run", self.images, "--out", self.out, "--limit", "40"],
+                       check=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                       stderr=follower)
+        os.close(follower)
+        shown = b""
+        try:
+            while chunk := os.read(leader, 65536):
+                shown += chunk
+        except OSError:  # all was read
+            pass
+        os.close(leader)
+        self.assertRegex(shown.decode(), r"\[#+\.*\] \d+ of 40 frames, [\d.]+ frames/s, "
+                                         r"\d+:\d\d left, \d+ loops?")
+
+    def test_help_names_every_command_and_exit_code(self):
+        text = loopbit("--help").stdout
+        for word in ("run", "demo", "options", "Exit codes: 0", "130"):
+            self.assertIn(word, text)
+        self.assertRegex(loopbit("--version").stdout, r"^\d+\.\d+\.\d+\n$")
+
+    # Bad frames: the run goes on.
+
+    def test_bad_frames_have_their_row_and_end_nothing(self):
+        folder = self.few_images()
+        whole = (folder / "000003.png").read_bytes()
+        (folder / "000003.png").write_bytes(whole[: len(whole) // 2])
+        (folder / "000005.png").write_bytes(b"")
+        (folder / "000007.png").write_text("this is no image")
+        (folder / "notes.txt").write_text("nor is this, by its name")
+        ran = loopbit("run", folder, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        unreadable = [r["frame"] for r in rows(self.out) if r["status"] == "unreadable"]
+        self.assertEqual(unreadable, ["3", "5", "7"])
+        for number in (3, 5, 7):
+            self.assertRegex(ran.stderr, rf"(?m)^loopbit: Frame {number}: .*00000{number}\.png")
+        self.assertEqual(len(ran.stderr.splitlines()), 3, ran.stderr)
+
+    def test_a_change_of_size_is_reported_frame_by_frame(self):
+        folder = self.few_images()
+        (folder / "000009.pgm").write_bytes(b"P5\n100 80\n255\n" + bytes(8000))
+        (folder / "000009.png").unlink()
+        ran = loopbit("run", folder, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(rows(self.out)[9]["status"], "unreadable")
+        self.assertEqual(sum(r["status"] == "unreadable" for r in rows(self.out)), 1)
+        self.assertIn("has 100 x 80 pixels, but the run began with 320 x 240", ran.stderr)
+
+    def test_many_bad_frames_do_not_flood_the_terminal(self):
+        folder = self.scratch / "bad"
+        folder.mkdir()
+        for number in range(100):
+            (folder / f"{number}.png").write_bytes(b"")
+        shutil.copy(self.images / "000000.png", folder / "100.png")
+        ran = loopbit("run", folder, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertLess(len(ran.stderr.splitlines()), 15)
+        self.assertIn("100 frames were unreadable", ran.stderr)
+
+    def test_no_readable_frame_at_all_is_an_error(self):
+        folder = self.scratch / "bad"
+        folder.mkdir()
+        (folder / "1.png").write_bytes(b"")
+        ran = loopbit("run", folder, "--out", self.out)
+        self.assertEqual(ran.returncode, 3)
+        self.assertIn("None of the 1 frames", ran.stderr)
+        self.assertEqual(rows(self.out)[0]["status"], "unreadable")
+
+    # Bad input, output and options: one sentence, an exit code, nothing lost.
+
+    def test_missing_input(self):
+        missing = self.scratch / "nothing"
+        self.assert_fails(loopbit("run", missing, "--out", self.out), 3, missing)
+        self.assertFalse(self.out.exists())
+
+    def test_empty_folder(self):
+        empty = self.scratch / "empty"
+        empty.mkdir()
+        self.assert_fails(loopbit("run", empty, "--out", self.out), 3, empty)
+
+    def test_input_that_is_no_video(self):
+        text = self.scratch / "letter.doc"
+        text.write_text("Dear loopbit,")
+        self.assert_fails(loopbit("run", text, "--out", self.out), 3, text)
+
+    def test_an_earlier_run_is_never_overwritten_unasked(self):
+        folder = self.few_images()
+        self.assertEqual(loopbit("run", folder, "--out", self.out).returncode, 0)
+        before = (self.out / "loops.csv").read_bytes()
+        self.assert_fails(loopbit("run", folder, "--out", self.out), 4, self.out, "--overwrite")
+        self.assertEqual((self.out / "loops.csv").read_bytes(), before)
+        again = loopbit("run", folder, "--out", self.out, "--overwrite")
+        self.assertEqual(again.returncode, 0, again.stderr)
+
+    def test_a_bad_setting_leaves_an_earlier_run_alone(self):
+        folder = self.few_images()
+        self.assertEqual(loopbit("run", folder, "--out", self.out).returncode, 0)
+        before = (self.out / "loops.csv").read_bytes()
+        bad = loopbit("run", folder, "--out", self.out, "--overwrite", "--set", "surf.x=1")
+        self.assert_fails(bad, 2, "surf.x")
+        self.assertEqual((self.out / "loops.csv").read_bytes(), before)
+
+    def test_output_folder_that_cannot_be_made(self):
+        file = self.scratch / "file"
+        file.write_text("")
+        self.assert_fails(loopbit("run", self.few_images(), "--out", file / "out"), 4, file)
+
+    @unittest.skipIf(os.geteuid() == 0, "root may write anywhere")
+    def test_read_only_output_folder(self):
+        self.out.mkdir(mode=0o555)
+        self.assert_fails(loopbit("run", self.few_images(), "--out", self.out), 4, self.out)
+
+    def test_full_disk_keeps_whole_rows(self):
+        def limit_file_size():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (700, 700))
+
+        ran = loopbit("run", self.few_images(), "--out", self.out, preexec_fn=limit_file_size)
+        self.assert_fails(ran, 4, "loops.csv", "rows before are kept")
+        text = (self.out / "loops.csv").read_text()
+        self.assertTrue(text.endswith("\n"))
+        kept = rows(self.out)
+        self.assertGreater(len(kept), 3)
+        self.assertTrue(all(row["verification_ms"] for row in kept))
+        self.assertIn(f"The {len(kept)} rows", ran.stderr)
+
+    def test_bad_settings(self):
+        cases = [
+            ("surf.max_keypoints=1", "surf.max_keypoints is 1, but must be between"),
+            ("surf.max_keypoints=many", "'many', but must be a whole number"),
+            ("surf.max_keypoint=500", "no setting 'surf.max_keypoint'"),
+            ("binary_content.gamma=nan", "binary_content.gamma is nan"),
+            ("gamma", "'gamma' has no value"),
+        ]
+        for setting, words in cases:
+            with self.subTest(setting):
+                ran = loopbit("run", self.images, "--out", self.out, "--set", setting)
+                self.assert_fails(ran, 2, words)
+
+    def test_bad_settings_files(self):
+        for text, words in [("{", "not valid JSON"), ("[]", "object"),
+                            ('{"surf": {"upright": 3}}', "surf.upright is '3'"),
+                            ('{"surf": {"max_keypoints": 1e9}}', "surf.max_keypoints")]:
+            with self.subTest(text):
+                config = self.scratch / "settings.json"
+                config.write_text(text)
+                ran = loopbit("run", self.images, "--out", self.out, "--config", config)
+                self.assert_fails(ran, 2, config, words)
+        missing = loopbit("run", self.images, "--out", self.out, "--config", "/nowhere.json")
+        self.assert_fails(missing, 3, "/nowhere.json")
+
+    def test_bad_command_lines(self):
+        for arguments in ([], ["walk"], ["run"], ["run", self.images], ["demo", "--frames", "x"],
+                          ["run", self.images, "--out", self.out, "--every", "0"]):
+            with self.subTest(arguments):
+                ran = loopbit(*arguments)
+                self.assertEqual(ran.returncode, 2, ran.stderr)
+                self.assertTrue(ran.stderr)
+
+    def test_unknown_kernel(self):
+        ran = loopbit("run", self.few_images(), "--out", self.out,
+                      environment={"LOOPBIT_KERNEL": "abacus"})
+        self.assert_fails(ran, 2, "LOOPBIT_KERNEL is 'abacus'", "scalar")
+
+    def test_bad_truth(self):
+        truth = self.scratch / "truth.csv"
+        truth.write_text("# query,first,last\n40,0,2\n41,one,3\n")
+        ran = loopbit("run", self.images, "--out", self.out, "--truth", truth)
+        self.assert_fails(ran, 3, truth, "3", "41,one,3")
+
+    def test_images_are_not_written_over_others(self):
+        ran = loopbit("demo", *WORLD, "--write-images", self.dataset)
+        self.assert_fails(ran, 4, self.dataset)
+
+    def test_ctrl_c_ends_cleanly_and_keeps_what_was_found(self):
+        process = subprocess.Popen([LOOPBIT, "run", self.images, "--out", self.out],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        loops = self.out / "loops.csv"
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            if loops.exists() and len(loops.read_text().splitlines()) > 20:
+                break
+            time.sleep(0.005)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, 130, errors)
+        self.assertIn("interrupted", output)
+        record = json.loads((self.out / "run.json").read_text())
+        self.assertEqual(record["stopped_by"], "interrupt")
+        kept = decisions(self.out)
+        self.assertEqual(record["counts"]["frames"], len(kept))
+        self.assertLess(len(kept), FRAMES)
+        self.assertEqual(kept, decisions(self.reference)[: len(kept)])
+
+
+class RealImagesTest(unittest.TestCase):
+    @unittest.skipUnless(os.environ.get("LOOPBIT_DATA"), "LOOPBIT_DATA names no folder of images")
+    def test_truth_scores_a_run(self):
+        data = pathlib.Path(os.environ["LOOPBIT_DATA"]) / "corridor_loop"
+        with tempfile.TemporaryDirectory() as out:
+            ran = loopbit("run", data / "images", "--out", out, "--truth", data / "truth.csv",
+                          "--not-false", data / "not_false.csv", "--ignore", data / "ignore.csv")
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            found = re.search(r"(\d+) of 38 revisits found: recall [\d.]+; 0 wrong", ran.stdout)
+            self.assertIsNotNone(found, ran.stdout)
+            self.assertGreaterEqual(int(found[1]), 0.90 * 38)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,496 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/loop_detector.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
+
+#include "test_support.hpp"
+
+namespace loopbit::test {
+namespace {
+
+constexpr int kLap = 24;
+
+/// Everything but max_keypoints and the working size as users have it: the views are small.
+LoopDetectorOptions fast_options() {
+  LoopDetectorOptions options;
+  options.surf = {.working_side_px = 320, .max_keypoints = 300};
+  return options;
+}
+
+/// Only the frame just before is too recent.
+LoopDetectorOptions short_window_options() {
+  LoopDetectorOptions options = fast_options();
+  options.exclusion.min_frames = 1;
+  options.exclusion.frames = 1;
+  return options;
+}
+
+/// A place seen again, from a little beside.
+cv::Mat1b again(int place) { return view(place, {6, 2}); }
+
+/// A detector that has passed the places first to last.
+LoopDetector after_places(int first, int last, const LoopDetectorOptions& options) {
+  LoopDetector detector(options);
+  for (int place = first; place <= last; ++place) detector.process(view(place));
+  return detector;
+}
+
+/// A robot that passes kLap different places and then the same again.
+std::vector<cv::Mat1b> two_laps() {
+  std::vector<cv::Mat1b> images;
+  images.reserve(std::size_t{2} * kLap);
+  Random random;
+  for (int place = 0; place < kLap; ++place) images.push_back(view(place));
+  for (int place = 0; place < kLap; ++place) {
+    images.push_back(with_noise(again(place), 3.0, random));
+  }
+  return images;
+}
+
+std::vector<Detection> process_all(LoopDetector& detector, const std::vector<cv::Mat1b>& images) {
+  std::vector<Detection> detections;
+  detections.reserve(images.size());
+  for (const cv::Mat1b& image : images) detections.push_back(detector.process(image));
+  return detections;
+}
+
+void expect_same_answer(const Detection& a, const Detection& b) {
+  EXPECT_EQ(a.frame, b.frame);
+  EXPECT_EQ(a.timestamp_s, b.timestamp_s);
+  EXPECT_EQ(a.status, b.status) << "of frame " << a.frame;
+  EXPECT_EQ(a.match, b.match) << "of frame " << a.frame;
+  EXPECT_EQ(a.score, b.score) << "of frame " << a.frame;
+  EXPECT_EQ(a.similarity, b.similarity);
+  EXPECT_EQ(a.matches, b.matches);
+  EXPECT_EQ(a.inliers, b.inliers);
+}
+
+void expect_same_answers(const std::vector<Detection>& a, const std::vector<Detection>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) expect_same_answer(a[i], b[i]);
+}
+
+/// What holds for any detection.
+void expect_consistent(const Detection& detection, const LoopDetectorOptions& options) {
+  SCOPED_TRACE(detection.frame);
+  const bool loop = detection.status == Status::loop;
+  EXPECT_EQ(loop, detection.score >= options.decision.min_score);
+  EXPECT_LE(detection.inliers, detection.matches);
+  EXPECT_EQ(detection.inliers > 0, detection.score > 0);
+  if (detection.match) {
+    EXPECT_GE(*detection.match, 0);
+    EXPECT_LT(*detection.match, detection.frame - options.exclusion.min_frames);
+    EXPECT_GT(detection.similarity, 0);
+  }
+  const bool verified = loop || detection.status == Status::few_matches ||
+                        detection.status == Status::no_geometry ||
+                        detection.status == Status::low_score;
+  EXPECT_EQ(detection.match.has_value(), verified);
+}
+
+TEST(LoopDetector, FindsTheLoopsOfASecondLapAndNoOthers) {
+  LoopDetector detector(fast_options());
+  const auto detections = process_all(detector, two_laps());
+  for (int frame = 0; frame < kLap; ++frame) {
+    EXPECT_NE(detections[static_cast<std::size_t>(frame)].status, Status::loop) << frame;
+  }
+  for (int frame = kLap; frame < 2 * kLap; ++frame) {
+    const Detection& detection = detections[static_cast<std::size_t>(frame)];
+    EXPECT_EQ(detection.status, Status::loop) << frame;
+    EXPECT_EQ(detection.match, frame - kLap);
+  }
+  for (const Detection& detection : detections) expect_consistent(detection, detector.options());
+}
+
+TEST(LoopDetector, NumbersFramesAndMeasuresTime) {
+  LoopDetector detector(fast_options());
+  EXPECT_EQ(detector.size(), 0);
+  for (int frame = 0; frame < 3; ++frame) {
+    const Detection detection = detector.process(view(frame), 0.5 * frame);
+    EXPECT_EQ(detection.frame, frame);
+    EXPECT_EQ(detection.timestamp_s, 0.5 * frame);
+    EXPECT_GT(detection.times.content_ms, 0);
+    EXPECT_GT(detection.times.features_ms, 0);
+    EXPECT_GE(detection.times.retrieval_ms, 0);
+    EXPECT_GE(detection.times.verification_ms, 0);
+    EXPECT_EQ(detector.size(), frame + 1);
+  }
+}
+
+TEST(LoopDetector, FirstFramesHaveNoEarlierPlace) {
+  LoopDetector detector(fast_options());
+  for (int frame = 0; frame <= 10; ++frame) {
+    EXPECT_EQ(detector.process(view(frame)).status, Status::no_earlier_place) << frame;
+  }
+  EXPECT_NE(detector.process(view(11)).status, Status::no_earlier_place);
+}
+
+TEST(LoopDetector, SameImagesGiveTheSameAnswers) {
+  const auto images = two_laps();
+  LoopDetector one(fast_options());
+  LoopDetector other(fast_options());
+  expect_same_answers(process_all(one, images), process_all(other, images));
+}
+
+TEST(LoopDetector, QueryAnswersAsProcessAndAddsNothing) {
+  LoopDetector asked(fast_options());
+  LoopDetector not_asked(fast_options());
+  for (const cv::Mat1b& image : two_laps()) {
+    const Detection query = asked.query(image);
+    const Detection again = asked.query(image);
+    const Detection processed = asked.process(image);
+    expect_same_answer(query, processed);
+    expect_same_answer(again, processed);
+    expect_same_answer(not_asked.process(image), processed);
+  }
+}
+
+TEST(LoopDetector, FramesBeforeSupportALoop) {
+  LoopDetectorOptions alone = fast_options();
+  alone.decision.agreement_steps = 0;
+  LoopDetector with(fast_options());
+  LoopDetector without(alone);
+  const auto images = two_laps();
+  const Detection supported = process_all(with, images).back();
+  const Detection single = process_all(without, images).back();
+  EXPECT_LE(single.score, single.inliers);
+  EXPECT_EQ(supported.inliers, single.inliers);
+  EXPECT_GT(supported.score, single.score);
+}
+
+TEST(LoopDetector, FramesBeforeSupportALoopInAFixedWindowToo) {
+  const auto last_score = [](int agreement_steps) {
+    LoopDetectorOptions options = fast_options();
+    options.exclusion.frames = 15;
+    options.decision.agreement_steps = agreement_steps;
+    LoopDetector detector = after_places(0, kLap - 1, options);
+    detector.process(again(0));
+    detector.process(again(1));
+    return detector.process(again(2)).score;
+  };
+  EXPECT_GT(last_score(2), last_score(1));
+  EXPECT_GT(last_score(1), last_score(0));
+}
+
+TEST(LoopDetector, FramesThatMatchedElsewhereDoNotSupportALoop) {
+  LoopDetector jumping = after_places(0, kLap - 1, fast_options());
+  const Detection alone = jumping.query(again(10));
+  jumping.process(again(2));
+  jumping.process(again(3));
+  EXPECT_EQ(jumping.process(again(10)).score, alone.score);
+}
+
+TEST(LoopDetector, StandingStillAddsNoEvidence) {
+  LoopDetector detector = after_places(0, kLap - 1, fast_options());
+  const Detection first = detector.process(again(3));
+  ASSERT_EQ(first.status, Status::loop);
+  for (int i = 0; i < 3; ++i) {
+    const Detection next = detector.process(again(3));
+    EXPECT_EQ(next.match, first.match);
+    EXPECT_EQ(next.score, first.score);
+  }
+}
+
+TEST(LoopDetector, MinScoreItselfIsEnough) {
+  LoopDetectorOptions options = short_window_options();
+  const Detection loop = after_places(1, 2, options).query(again(1));
+  ASSERT_EQ(loop.status, Status::loop);
+  options.decision.min_score = loop.score;
+  expect_same_answer(after_places(1, 2, options).query(again(1)), loop);
+
+  options.decision.min_score = loop.score + 0.001;
+  const Detection rejected = after_places(1, 2, options).query(again(1));
+  EXPECT_EQ(rejected.status, Status::low_score);
+  EXPECT_EQ(rejected.match, loop.match);
+  EXPECT_EQ(rejected.score, loop.score);
+}
+
+TEST(LoopDetector, LoopIsTheBestNeighbourOfItsCandidate) {
+  // A blurred picture of the same spot looks most alike, and so keeps its neighbour from being a
+  // candidate; but the sharp one from further beside shares more features.
+  cv::Mat blurred;
+  cv::GaussianBlur(view(1), blurred, {0, 0}, 2.0);
+  LoopDetector detector(short_window_options());
+  detector.process(view(5));
+  detector.process(blurred);
+  detector.process(view(1, {20, 8}));
+  detector.process(view(6));
+  const Detection detection = detector.query(view(1, {1, 1}));
+  EXPECT_EQ(detection.status, Status::loop);
+  EXPECT_EQ(detection.match, 2);
+}
+
+// Frames without a usable image
+
+TEST(LoopDetector, SkippedFrameCountsAndIsNeverAMatch) {
+  LoopDetector detector(fast_options());
+  const auto images = two_laps();
+  for (int frame = 0; frame < 2 * kLap; ++frame) {
+    if (frame == 5 || frame == kLap + 8) {
+      const Detection skipped = detector.skip(1.5);
+      EXPECT_EQ(skipped.frame, frame);
+      EXPECT_EQ(skipped.timestamp_s, 1.5);
+      EXPECT_EQ(skipped.status, Status::unreadable);
+      EXPECT_FALSE(skipped.match);
+      continue;
+    }
+    const Detection detection = detector.process(images[static_cast<std::size_t>(frame)]);
+    EXPECT_EQ(detection.frame, frame);
+    EXPECT_NE(detection.match, 5) << frame;
+    EXPECT_EQ(detection.status == Status::loop, frame >= kLap && frame != kLap + 5) << frame;
+  }
+  EXPECT_EQ(detector.size(), 2 * kLap);
+}
+
+TEST(LoopDetector, OnlySkippedFramesAreNoPlaces) {
+  LoopDetector detector(fast_options());
+  for (int frame = 0; frame < 30; ++frame) detector.skip();
+  const Detection detection = detector.process(view(1));
+  EXPECT_EQ(detection.frame, 30);
+  EXPECT_FALSE(detection.match);
+}
+
+TEST(LoopDetector, UnusableImageThrowsAndChangesNothing) {
+  LoopDetector detector(fast_options());
+  LoopDetector undisturbed(fast_options());
+  for (const cv::Mat1b& image : two_laps()) {
+    EXPECT_THROW(detector.process(cv::Mat()), Error);
+    EXPECT_THROW(detector.process(cv::Mat1b(31, 31, 5)), Error);
+    EXPECT_THROW(detector.process(cv::Mat1f(100, 100, 5)), Error);
+    EXPECT_THROW(static_cast<void>(detector.query(cv::Mat())), Error);
+    EXPECT_EQ(detector.size(), undisturbed.size());
+    expect_same_answer(detector.process(image), undisturbed.process(image));
+  }
+  expect_error(ErrorKind::input, {"31 x 31"}, [&] { detector.process(cv::Mat1b(31, 31, 5)); });
+}
+
+TEST(LoopDetector, BlankImagesAreNeverLoops) {
+  LoopDetector detector = after_places(0, kLap - 1, fast_options());
+  for (int frame = 0; frame < 20; ++frame) {
+    const Detection detection = detector.process(cv::Mat1b(240, 320, 90));
+    EXPECT_EQ(detection.status, Status::no_similar_place);
+    EXPECT_FALSE(detection.match);
+    EXPECT_EQ(detection.score, 0);
+  }
+  EXPECT_EQ(detector.process(again(3)).match, 3) << "blank frames hide no earlier place";
+}
+
+TEST(LoopDetector, UnrelatedImageSharesTooLittle) {
+  const LoopDetector detector = after_places(0, kLap - 1, fast_options());
+  for (int scene = 100; scene < 110; ++scene) {
+    const Detection detection = detector.query(view(scene));
+    EXPECT_NE(detection.status, Status::loop) << scene;
+    expect_consistent(detection, detector.options());
+  }
+}
+
+// What is too recent
+
+TEST(LoopDetector, StandingStillIsNoLoop) {
+  LoopDetector detector(fast_options());
+  Random random;
+  const cv::Mat1b scene = view(1);
+  for (int frame = 0; frame < 200; ++frame) {
+    EXPECT_EQ(detector.process(with_noise(scene, 4.0, random)).status, Status::no_earlier_place)
+        << frame;
+  }
+}
+
+TEST(LoopDetector, StandingStillInHeavyNoiseIsNoLoop) {
+  LoopDetector detector(fast_options());
+  Random random;
+  const cv::Mat1b scene = view(1);
+  for (int frame = 0; frame < 60; ++frame) {
+    EXPECT_NE(detector.process(with_noise(scene, 40.0, random)).status, Status::loop) << frame;
+  }
+}
+
+TEST(LoopDetector, PassingAlongOneSceneIsNoLoopUntilItIsSeenAgain) {
+  constexpr int kStepPx = 16;
+  constexpr int kFrames = 70;
+  const cv::Mat1b scene = textured_image({kFrames * kStepPx + 320, 250}, 1);
+  const auto passing_view = [&](int frame, cv::Point beside_px) {
+    return scene(cv::Rect(cv::Point(frame * kStepPx, 0) + beside_px, cv::Size(320, 240))).clone();
+  };
+  LoopDetector detector(fast_options());
+  for (int frame = 0; frame < kFrames; ++frame) {
+    EXPECT_NE(detector.process(passing_view(frame, {0, 0})).status, Status::loop) << frame;
+  }
+  for (int frame = 0; frame < 10; ++frame) {
+    const Detection detection = detector.process(passing_view(frame, {3, 5}));
+    EXPECT_EQ(detection.status, Status::loop);
+    EXPECT_NEAR(detection.match.value_or(-100), frame, 1);
+  }
+}
+
+TEST(LoopDetector, WindowFixedByFrames) {
+  LoopDetectorOptions options = fast_options();
+  options.exclusion = {.min_frames = 1, .frames = 4};
+  EXPECT_EQ(after_places(0, 3, options).query(again(0)).status, Status::no_earlier_place);
+  const LoopDetector detector = after_places(0, 4, options);
+  EXPECT_EQ(detector.query(again(0)).status, Status::loop);
+  EXPECT_EQ(detector.query(again(0)).match, 0);
+  EXPECT_NE(detector.query(again(1)).match, 1);
+}
+
+TEST(LoopDetector, WindowIsNeverShorterThanMinFrames) {
+  LoopDetectorOptions options = fast_options();
+  options.exclusion = {.min_frames = 4, .frames = 1};
+  EXPECT_EQ(after_places(0, 3, options).query(again(0)).status, Status::no_earlier_place);
+  EXPECT_EQ(after_places(0, 4, options).query(again(0)).status, Status::loop);
+
+  options.exclusion = {.min_frames = 2, .seconds = 0.1};
+  LoopDetector detector(options);
+  detector.process(view(0), 0.0);
+  detector.process(view(1), 1.0);
+  EXPECT_EQ(detector.query(again(0), 2.0).status, Status::no_earlier_place);
+  detector.process(view(2), 2.0);
+  EXPECT_EQ(detector.query(again(0), 3.0).status, Status::loop);
+}
+
+LoopDetectorOptions ten_seconds() {
+  LoopDetectorOptions options = fast_options();
+  options.exclusion = {.min_frames = 1, .seconds = 10.0};
+  return options;
+}
+
+TEST(LoopDetector, WindowFixedBySeconds) {
+  LoopDetector detector(ten_seconds());
+  detector.process(view(0), 100.0);
+  detector.process(view(1), 100.0);  // two frames may have one time
+  detector.process(view(2), 105.0);
+  detector.process(view(3), 106.0);
+  EXPECT_EQ(detector.query(again(0), 109.9).status, Status::no_earlier_place);
+  for (const PlaceId place : {0, 1}) {
+    const Detection detection = detector.query(again(place), 110.0);
+    EXPECT_EQ(detection.status, Status::loop) << place;
+    EXPECT_EQ(detection.match, place);
+  }
+  EXPECT_NE(detector.query(again(2), 114.9).match, 2);
+  EXPECT_EQ(detector.query(again(2), 115.0).match, 2);
+}
+
+TEST(LoopDetector, MissingOrBackwardTimeThrowsAndChangesNothing) {
+  LoopDetector detector(ten_seconds());
+  EXPECT_THROW(detector.process(view(0)), Error);
+  EXPECT_EQ(detector.size(), 0);
+  detector.process(view(0), 100.0);
+  detector.process(view(1), 101.0);
+  expect_error(ErrorKind::input, {"Frame 2", "timestamp", "exclusion.seconds is 10"},
+               [&] { detector.process(view(2)); });
+  expect_error(ErrorKind::input, {"Frame 2", "100.5", "101"},
+               [&] { detector.process(view(2), 100.5); });
+  expect_error(ErrorKind::input, {"Frame 2"},
+               [&] { detector.process(view(2), std::numeric_limits<double>::quiet_NaN()); });
+  EXPECT_THROW(static_cast<void>(detector.query(view(2))), Error);
+  EXPECT_EQ(detector.size(), 2);
+  EXPECT_EQ(detector.process(again(0), 110.0).match, 0) << "the refused times left no trace";
+}
+
+TEST(LoopDetector, SkippedFrameNeedsNoTime) {
+  LoopDetector detector(ten_seconds());
+  detector.skip();
+  detector.process(view(0), 100.0);
+  detector.skip();
+  detector.skip(50.0);
+  EXPECT_EQ(detector.size(), 4);
+  EXPECT_EQ(detector.query(again(0), 109.9).status, Status::no_similar_place);
+  EXPECT_EQ(detector.process(again(0), 110.0).match, 1);
+}
+
+TEST(LoopDetector, TimesDoNotMatterUnlessTheWindowIsInSeconds) {
+  LoopDetector detector(short_window_options());
+  detector.process(view(0), 100.0);
+  detector.process(view(1), 50.0);
+  detector.process(view(2));
+  EXPECT_EQ(detector.process(again(0), 20.0).status, Status::loop);
+}
+
+// The object
+
+TEST(LoopDetector, RefusesOptionsOutOfRange) {
+  LoopDetectorOptions options;
+  options.decision.min_score = -1;
+  expect_error(ErrorKind::option, {"decision.min_score is -1"}, [&] { LoopDetector{options}; });
+  options = {};
+  options.exclusion.frames = 1;
+  options.exclusion.seconds = 1;
+  expect_error(ErrorKind::option, {"exclusion.seconds"}, [&] { LoopDetector{options}; });
+}
+
+TEST(LoopDetector, KeepsItsOptions) {
+  EXPECT_EQ(LoopDetector(ten_seconds()).options().exclusion.seconds, 10.0);
+}
+
+TEST(LoopDetector, MovesWithAllItKnows) {
+  LoopDetector first = after_places(0, 1, short_window_options());
+  LoopDetector second(std::move(first));
+  EXPECT_EQ(second.size(), 2);
+  EXPECT_EQ(second.query(again(0)).status, Status::loop);
+  LoopDetector third;
+  third = std::move(second);
+  EXPECT_EQ(third.size(), 2);
+  EXPECT_EQ(third.options().exclusion.frames, 1);
+  EXPECT_EQ(third.query(again(0)).status, Status::loop);
+}
+
+TEST(LoopDetector, MovedFromCanBeAssignedAnew) {
+  LoopDetector detector(fast_options());
+  detector.process(view(0));
+  const LoopDetector taken(std::move(detector));
+  detector = LoopDetector(fast_options());
+  EXPECT_EQ(detector.size(), 0);
+  EXPECT_EQ(detector.process(view(1)).frame, 0);
+  EXPECT_EQ(taken.size(), 1);
+}
+
+TEST(LoopDetector, TakesColourAnd16Bits) {
+  const LoopDetector detector = after_places(0, 1, short_window_options());
+  const cv::Mat1b gray = again(0);
+  const Detection expected = detector.query(gray);
+  ASSERT_EQ(expected.status, Status::loop);
+  cv::Mat colour;
+  cv::merge(std::vector<cv::Mat>{gray, gray, gray}, colour);
+  expect_same_answer(detector.query(colour), expected);
+  cv::Mat deep;
+  gray.convertTo(deep, CV_16U, 16.0);
+  EXPECT_EQ(detector.query(deep).status, Status::loop);
+}
+
+TEST(Status, HasItsNameInWords) {
+  EXPECT_EQ(to_string(Status::loop), "loop");
+  EXPECT_EQ(to_string(Status::no_earlier_place), "no_earlier_place");
+  EXPECT_EQ(to_string(Status::no_similar_place), "no_similar_place");
+  EXPECT_EQ(to_string(Status::few_matches), "few_matches");
+  EXPECT_EQ(to_string(Status::no_geometry), "no_geometry");
+  EXPECT_EQ(to_string(Status::low_score), "low_score");
+  EXPECT_EQ(to_string(Status::unreadable), "unreadable");
+}
+
+TEST(LoopDetector, TheSamePicturesAgainAreLoops) {
+  LoopDetector detector(fast_options());
+  for (int place = 0; place < kLap; ++place) detector.process(view(place));
+  for (int place = 0; place < kLap; ++place) {
+    const Detection detection = detector.process(view(place));
+    EXPECT_EQ(detection.status, Status::loop) << place;
+    EXPECT_EQ(detection.match, place);
+  }
+}
+
+TEST(LoopDetector, TimesThatAreNoNumbersAreRefusedFromTheStart) {
+  LoopDetector detector(ten_seconds());
+  EXPECT_THROW(detector.process(view(0), std::numeric_limits<double>::quiet_NaN()), Error);
+  detector.skip(std::numeric_limits<double>::infinity());
+  EXPECT_EQ(detector.process(view(0), 1.0).frame, 1);
+}
+
+}  // namespace
+}  // namespace loopbit::test
