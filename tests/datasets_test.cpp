@@ -395,7 +395,8 @@ TEST_F(Datasets, EveryCutOfABaselineJpegIsSeen) {
 TEST_F(Datasets, EveryCutOfAProgressiveJpegIsSeen) {
   const Bytes jpeg = encode(".jpg", noise(CV_8UC3), {cv::IMWRITE_JPEG_PROGRESSIVE, 1});
   constexpr std::array<unsigned char, 2> kProgressive = {0xFF, 0xC2};
-  ASSERT_FALSE(std::ranges::search(jpeg, kProgressive).empty());
+  ASSERT_NE(std::search(jpeg.begin(), jpeg.end(), kProgressive.begin(), kProgressive.end()),
+            jpeg.end());
   expect_every_cut_seen("x.jpg", jpeg, 2);
 }
 
@@ -442,7 +443,8 @@ TEST_F(Datasets, DamagedPngChunkIsSeen) {
 TEST_F(Datasets, HugeDeclaredSizeIsAFrameError) {
   Bytes jpeg = encode(".jpg", noise(CV_8UC1));
   constexpr std::array<unsigned char, 2> kFrameHeader = {0xFF, 0xC0};
-  const auto header = std::ranges::search(jpeg, kFrameHeader).begin();
+  const auto header =
+      std::search(jpeg.begin(), jpeg.end(), kFrameHeader.begin(), kFrameHeader.end());
   ASSERT_NE(header, jpeg.end());
   std::fill_n(header + 5, 4, static_cast<unsigned char>(0xFE));  // height and width
   expect_frame_error(read_bytes("x.jpg", jpeg), "cannot be decoded");

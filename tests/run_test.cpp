@@ -45,16 +45,16 @@ TEST_F(RunFolderTest, NeverReplacesARunUnasked) {
   RunFolder(path("run"), false).add({.frame = 0, .status = Status::unreadable});
   const auto before = lines_of(path("run/loops.csv"));
   test::expect_error(ErrorKind::output, {path("run"), "--overwrite"},
-                     [&] { RunFolder(path("run"), false); });
+                     [&] { const RunFolder again(path("run"), false); });
   EXPECT_EQ(lines_of(path("run/loops.csv")), before);
-  RunFolder(path("run"), true);
+  const RunFolder replaced(path("run"), true);
   EXPECT_EQ(lines_of(path("run/loops.csv")), std::vector<std::string>{kLoopsHeader});
 }
 
 TEST_F(RunFolderTest, OverwritingKeepsOtherFiles) {
   RunFolder(path("run"), false).finish({});
   (void)write("run/notes.txt", "mine");
-  RunFolder(path("run"), true);
+  const RunFolder replaced(path("run"), true);
   EXPECT_TRUE(fs::exists(path("run/notes.txt")));
   EXPECT_FALSE(fs::exists(path("run/run.json")));
 }
@@ -120,6 +120,7 @@ Told run_all(ImageSource& source, int stop_after = -1) {
 
 std::vector<Frame> frames(int number) {
   std::vector<Frame> list;
+  list.reserve(static_cast<std::size_t>(number));
   for (int i = 0; i < number; ++i) {
     list.push_back({"frame " + std::to_string(i), 0.5 * i, test::view(i), {}});
   }

@@ -157,6 +157,7 @@ TEST(WorldRender, DependsNeitherOnOrderNorOnThreads) {
   const World world(small_world());
   const std::vector<int> frames{0, 33, 80, 121, 179};
   std::vector<cv::Mat> forwards;
+  forwards.reserve(frames.size());
   for (const int frame : frames) forwards.push_back(world.render(frame));
   std::vector<cv::Mat> one(frames.size());
   std::vector<cv::Mat> other(frames.size());

@@ -64,6 +64,7 @@ std::vector<float> gaussian_kernel(double sigma) {
     sum += weights.back();
   }
   std::vector<float> kernel;
+  kernel.reserve(weights.size());
   for (const double weight : weights) kernel.push_back(static_cast<float>(weight / sum));
   return kernel;
 }

@@ -15,7 +15,7 @@
 namespace {
 
 using loopbit::ErrorKind;
-using namespace loopbit::cli;
+namespace cli = loopbit::cli;
 
 constexpr const char* kFooter =
     "Exit codes: 0 done; 2 bad option or setting; 3 input missing or unreadable; 4 output cannot "
@@ -25,13 +25,13 @@ constexpr const char* kFooter =
 int exit_code_of(ErrorKind kind) {
   switch (kind) {
     case ErrorKind::option:
-      return bad_option;
+      return cli::bad_option;
     case ErrorKind::input:
-      return bad_input;
+      return cli::bad_input;
     case ErrorKind::output:
-      return bad_output;
+      return cli::bad_output;
   }
-  return internal_error;
+  return cli::internal_error;
 }
 
 /// CLI11 says of an unknown command only that one is required.
@@ -49,15 +49,15 @@ int run_command_line(int argc, char** argv) {
   app.footer(kFooter);
   app.set_version_flag("--version", loopbit::kVersion);
   app.require_subcommand(1);
-  int exit_code = success;
-  add_run(app, exit_code);
-  add_demo(app, exit_code);
-  add_options(app);
+  int exit_code = cli::success;
+  cli::add_run(app, exit_code);
+  cli::add_demo(app, exit_code);
+  cli::add_options(app);
   check_command(app, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? success : bad_option;
+    return app.exit(error) == 0 ? cli::success : cli::bad_option;
   }
   return exit_code;
 }
@@ -74,6 +74,6 @@ int main(int argc, char** argv) {
     return exit_code_of(error.kind());
   } catch (const std::exception& error) {
     fmt::print(stderr, "loopbit: internal error, please report it: {}\n", error.what());
-    return internal_error;
+    return cli::internal_error;
   }
 }

@@ -18,6 +18,8 @@ class Progress {
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
+  Progress(Progress&&) = delete;
+  Progress& operator=(Progress&&) = delete;
 
   /// One frame more is done; `is_loop` counts it among the loops.
   void advance(bool is_loop);

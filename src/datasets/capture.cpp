@@ -28,8 +28,9 @@ class CaptureSource final : public ImageSource {
     std::optional<std::size_t> size;
   };
 
-  CaptureSource(cv::VideoCapture capture, Facts facts)
-      : capture_(std::move(capture)), facts_(std::move(facts)) {}
+  /// Shares `capture`, which is a handle.
+  CaptureSource(const cv::VideoCapture& capture, Facts facts)
+      : capture_(capture), facts_(std::move(facts)) {}
 
   bool next(Frame& frame) override {
     if (!skip()) return false;

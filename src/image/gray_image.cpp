@@ -72,7 +72,7 @@ cv::Mat1b stretch_to_8_bits(const cv::Mat1w& image) {
 
 cv::Mat1b gray_image(const cv::Mat& image) {
   check(image);
-  const cv::Mat gray = to_single_channel(image);
+  cv::Mat gray = to_single_channel(image);
   if (gray.depth() == CV_16U) return stretch_to_8_bits(gray);
   return gray;
 }

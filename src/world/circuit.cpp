@@ -226,13 +226,12 @@ std::vector<GridPoint> Circuit::closed_steps(GridPoint crossing) const {
 bool Circuit::blank_near(Vec2 point, double reach_m) const {
   if (blank_centre_m_.empty()) return false;
   const GridPoint low{floor_int(point.x / pitch_m_), floor_int(point.y / pitch_m_)};
-  for (const GridPoint add : {GridPoint{0, 0}, {1, 0}, {0, 1}, {1, 1}}) {
-    const auto* entry = find(low + add);
-    if (entry == nullptr) continue;
-    if (blank_arm(entry->second, -1, point, reach_m)) return true;
-    if (blank_arm(entry->second, 1, point, reach_m)) return true;
-  }
-  return false;
+  constexpr std::array kCorners{GridPoint{0, 0}, GridPoint{1, 0}, GridPoint{0, 1}, GridPoint{1, 1}};
+  return std::any_of(kCorners.begin(), kCorners.end(), [&](GridPoint corner) {
+    const auto* entry = find(low + corner);
+    return entry != nullptr && (blank_arm(entry->second, -1, point, reach_m) ||
+                                blank_arm(entry->second, 1, point, reach_m));
+  });
 }
 
 const std::pair<std::uint64_t, int>* Circuit::find(GridPoint point) const {

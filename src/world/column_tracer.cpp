@@ -138,7 +138,7 @@ void ColumnTracer::collect(int column, std::vector<Hit>& hits) const {
 }
 
 void ColumnTracer::add_surface(Piece piece, double top_px, float& skyline_px,
-                               std::vector<Piece>& pieces) const {
+                               std::vector<Piece>& pieces) {
   const auto top = static_cast<float>(top_px);
   if (top >= skyline_px) return;
   piece.top_px = top;

@@ -67,7 +67,8 @@ class ColumnTracer {
   [[nodiscard]] Span columns_of(const Billboard& board) const;
   [[nodiscard]] bool hit_prism(int index, Vec2 ray, Hit& hit) const;
   void collect(int column, std::vector<Hit>& hits) const;
-  void add_surface(Piece piece, double top_px, float& skyline_px, std::vector<Piece>& pieces) const;
+  static void add_surface(Piece piece, double top_px, float& skyline_px,
+                          std::vector<Piece>& pieces);
   void add_ground(double from_m, double to_m, float& skyline_px, std::vector<Piece>& pieces) const;
   void add_prism(const Hit& hit, Vec2 ray, float& skyline_px, std::vector<Piece>& pieces) const;
   void add_board(const Hit& hit, float skyline_px, std::vector<Piece>& pieces) const;

@@ -92,8 +92,8 @@ void Shader::draw_sky(float skyline_px, std::vector<Color>& rows) const {
   for (int row = 0; row < end; row += kSkyStep) {
     const Color below = sky_at(row + kSkyStep);
     for (int step = 0; step < std::min(kSkyStep, end - row); ++step) {
-      rows[static_cast<std::size_t>(row + step)] =
-          blend(above, below, static_cast<float>(step) / kSkyStep);
+      const int at = row + step;
+      rows[static_cast<std::size_t>(at)] = blend(above, below, static_cast<float>(step) / kSkyStep);
     }
     above = below;
   }
@@ -218,6 +218,7 @@ void Shader::draw(int column, const std::vector<Piece>& pieces, float skyline_px
                   std::vector<Color>& rows) {
   ray_ = camera_.ray(column);
   draw_sky(skyline_px, rows);
+  // NOLINTNEXTLINE(modernize-loop-convert): clang-tidy 14 cannot read std::views of GCC 12
   for (auto piece = pieces.rbegin(); piece != pieces.rend(); ++piece) {
     switch (piece->kind) {
       case Piece::Kind::ground:

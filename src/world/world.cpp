@@ -92,6 +92,8 @@ struct World::Plan {
         traffic(seed, circuit, drive, options.moving_objects) {}
   Plan(const Plan&) = delete;
   Plan& operator=(const Plan&) = delete;
+  Plan(Plan&&) = delete;
+  Plan& operator=(Plan&&) = delete;
   ~Plan() = default;
 
   [[nodiscard]] Camera camera(int frame) const;
@@ -198,7 +200,7 @@ cv::Mat World::render(int frame) const {
   return image;
 }
 
-double World::time_s(int frame) const { return frame / kFramesPerSecond; }
+double World::time_s(int frame) { return frame / kFramesPerSecond; }
 
 std::vector<PlaceRun> World::same_place() const {
   return find_places(plan_->views(), plan_->rule(options().same_place_m, kCosSame));
@@ -220,7 +222,7 @@ class WorldSource final : public ImageSource {
 
   bool next(Frame& frame) override {
     if (at_end()) return false;
-    frame = {fmt::format("{:06}", frame_), world_->time_s(frame_), world_->render(frame_), {}};
+    frame = {fmt::format("{:06}", frame_), World::time_s(frame_), world_->render(frame_), {}};
     ++frame_;
     return true;
   }

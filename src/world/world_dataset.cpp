@@ -68,7 +68,7 @@ void write_dataset(const World& world, const std::string& folder,
     on_frame(frame);
   }
   write_rows(root / "times.txt", frames,
-             [&](int frame) { return fmt::format("{:.6f}\n", world.time_s(frame)); });
+             [&](int frame) { return fmt::format("{:.6f}\n", World::time_s(frame)); });
   write_rows(root / "poses.txt", frames, [&](int frame) { return kitti_row(world.pose(frame)); });
   write_place_runs(root / "truth.csv", "query, first and last true earlier frame",
                    world.same_place());

@@ -86,6 +86,8 @@ class World {
   /// laps: a circuit has at least 106 m.
   explicit World(const WorldOptions& options);
   ~World();
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
   World(World&&) noexcept;
   World& operator=(World&&) noexcept;
 
@@ -95,7 +97,7 @@ class World {
   /// The lap in which `frame` is driven, from 0. As in all members, 0 <= frame < options().frames.
   [[nodiscard]] int lap(int frame) const;
   [[nodiscard]] Pose pose(int frame) const;
-  [[nodiscard]] double time_s(int frame) const;
+  [[nodiscard]] static double time_s(int frame);
 
   /// Whether `frame` is driven between the plain walls.
   [[nodiscard]] bool blank(int frame) const;
