@@ -66,6 +66,7 @@ std::vector<Frame> read_all(const std::string& input) { return read_all(*open_so
 
 std::vector<std::string> names(const std::vector<Frame>& frames) {
   std::vector<std::string> result;
+  result.reserve(frames.size());
   for (const Frame& frame : frames) result.push_back(frame.name);
   return result;
 }

@@ -24,6 +24,8 @@ class PrefetchSource final : public ImageSource {
 
   PrefetchSource(const PrefetchSource&) = delete;
   PrefetchSource& operator=(const PrefetchSource&) = delete;
+  PrefetchSource(PrefetchSource&&) = delete;
+  PrefetchSource& operator=(PrefetchSource&&) = delete;
 
   ~PrefetchSource() override {
     {
