@@ -278,6 +278,15 @@ class CommandLineTest(unittest.TestCase):
         self.assert_fails(bad, 2, "surf.x")
         self.assertEqual((self.out / "loops.csv").read_bytes(), before)
 
+    def test_an_unknown_kernel_leaves_an_earlier_run_alone(self):
+        folder = self.few_images(2)
+        self.assertEqual(loopbit("run", folder, "--out", self.out).returncode, 0)
+        before = (self.out / "loops.csv").read_bytes()
+        bad = loopbit("run", folder, "--out", self.out, "--overwrite",
+                      environment={"LOOPBIT_KERNEL": "abacus"})
+        self.assert_fails(bad, 2, "LOOPBIT_KERNEL")
+        self.assertEqual((self.out / "loops.csv").read_bytes(), before)
+
     def test_output_folder_that_cannot_be_made(self):
         file = self.scratch / "file"
         file.write_text("")

@@ -57,8 +57,7 @@ void check_readable(const std::vector<Detection>& detections, const std::string&
   }
 }
 
-void drive(ImageSource& source, RunFolder& folder, const LoopDetectorOptions& options) {
-  LoopDetector detector(options);
+void drive(ImageSource& source, LoopDetector& detector, RunFolder& folder) {
   Progress progress(source.size());
   const RunListener listener{[&](const Detection& detection) {
                                folder.add(detection);
@@ -102,6 +101,8 @@ int run_session(Session session, const SessionFlags& flags) {
                    .every = session.every,
                    .limit = session.limit,
                    .threads = thread_count(flags.threads)};
+  // Before the folder: what refuses the run may not cost an earlier one.
+  LoopDetector detector(record.options);
   RunFolder folder(flags.out, flags.overwrite);
   cv::setNumThreads(record.threads);
   if (record.threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
@@ -114,7 +115,7 @@ int run_session(Session session, const SessionFlags& flags) {
     folder.finish(record);
   };
   try {
-    drive(*session.source, folder, record.options);
+    drive(*session.source, detector, folder);
     if (!stop_requested) check_readable(folder.detections(), session.input);
   } catch (const Error& error) {
     try {

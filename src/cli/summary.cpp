@@ -14,7 +14,7 @@ std::ptrdiff_t count(const std::vector<Detection>& detections, Status status) {
                        [&](const Detection& d) { return d.status == status; });
 }
 
-/// How often frames that found nothing did so, and what that means, most frequent first.
+/// How often frames that found nothing did so, and what that means, in the order of the steps.
 void print_reasons(const std::vector<Detection>& detections) {
   constexpr std::pair<Status, const char*> kReasons[] = {
       {Status::no_earlier_place, "only recent places to compare with"},
