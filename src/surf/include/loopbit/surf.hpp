@@ -56,8 +56,7 @@ struct SurfOptions {
 ///
 /// Bay, Tuytelaars, Van Gool, "SURF: Speeded Up Robust Features", ECCV 2006. The response threshold
 /// is a thirtieth of the customary one, so that the budget of keypoints decides on most images; dim
-/// or blurred ones have fewer. Deterministic. Cost: about 10 ns a working pixel and 12 us a
-/// keypoint.
+/// or blurred ones have fewer. Deterministic. Cost: see bm_extract_surf.
 Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options = {});
 
 }  // namespace loopbit
