@@ -2,10 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/ground_truth.hpp"
 
-#include <array>
-
-#include "loopbit/evaluation.hpp"
-
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -16,6 +12,16 @@ class GroundTruthTest : public test::ScratchTest {};
 TEST_F(GroundTruthTest, ReadsRunsAndPassesOverComments) {
   const std::string file = write("truth.csv", "# query,first,last\n\n40,0,2\r\n41 , 1 , 3 \n");
   EXPECT_EQ(read_place_runs(file), (std::vector<PlaceRun>{{40, 0, 2}, {41, 1, 3}}));
+}
+
+TEST_F(GroundTruthTest, ReadsPairsAndPassesOverNames) {
+  const std::string pairs = write("truth.csv", "# by hand\nquery,match\n40,2\n40,7\n");
+  EXPECT_EQ(read_place_runs(pairs), (std::vector<PlaceRun>{{40, 2, 2}, {40, 7, 7}}));
+  const std::string spaced = write("truth.txt", "40 2\n41\t 3\n");
+  EXPECT_EQ(read_place_runs(spaced), (std::vector<PlaceRun>{{40, 2, 2}, {41, 3, 3}}));
+  const std::string named = write("truth.csv", "Query, First, Last\n40,2,7\n");
+  EXPECT_EQ(read_place_runs(named), (std::vector<PlaceRun>{{40, 2, 7}}));
+  EXPECT_TRUE(read_place_runs(write("truth.csv", "# no revisit\n")).empty());
 }
 
 TEST_F(GroundTruthTest, ReadsWhatItWrote) {
@@ -35,6 +41,13 @@ TEST_F(GroundTruthTest, BadRowsNameFileAndLine) {
     const std::string file = write("truth.csv", std::string("7,1,2\n") + row + "\n");
     test::expect_error(ErrorKind::input, {file, "2", row}, [&] { read_place_runs(file); });
   }
+  for (const char* text : {"x,1,2\n", "7\n", "7,1,2,3\n", "7,,2\n"}) {
+    SCOPED_TRACE(text);
+    const std::string file = write("truth.csv", text);
+    test::expect_error(ErrorKind::input, {file, "line 1"}, [&] { read_place_runs(file); });
+  }
+  const std::string mixed = write("truth.csv", "query,match\n7,1\n7,1,2\n");
+  test::expect_error(ErrorKind::input, {mixed, "line 3"}, [&] { read_place_runs(mixed); });
   const std::string list = write("ignore.csv", "wall\n");
   test::expect_error(ErrorKind::input, {list, "1", "wall"}, [&] { read_frame_list(list); });
 }
@@ -46,38 +59,17 @@ TEST_F(GroundTruthTest, MissingAndUnwritableFilesAreNamed) {
   test::expect_error(ErrorKind::output, {nowhere}, [&] { write_place_runs(nowhere, "", {}); });
 }
 
-Detection detection(PlaceId frame, Status status, std::optional<PlaceId> match) {
-  return {.frame = frame, .status = status, .match = match};
-}
-
-TEST(CountDecisions, TellsRightToleratedWrongMissedAndIgnored) {
-  const GroundTruth truth{{{10, 0, 2}, {11, 1, 3}, {12, 2, 4}, {13, 3, 5}, {13, 8, 8}, {14, 4, 6}},
-                          {{11, 0, 5}, {15, 0, 1}},
-                          {14}};
-  const std::array detections{
-      detection(9, Status::loop, 0),        // no such place: wrong
-      detection(10, Status::loop, 2),       // right
-      detection(11, Status::loop, 5),       // near: tolerated, and the revisit is missed
-      detection(12, Status::low_score, 3),  // the right match, but not accepted: missed
-      detection(13, Status::loop, 8),       // right by its second run
-      detection(14, Status::loop, 0),       // ignored, else wrong
-      detection(15, Status::loop, 1),       // no revisit, but near
-      detection(16, Status::unreadable, std::nullopt),
-  };
-  const DecisionCounts counts = count_decisions(detections, truth);
-  EXPECT_EQ(counts.positives, 4);
-  EXPECT_EQ(counts.right, 2);
-  EXPECT_EQ(counts.tolerated, 2);
-  EXPECT_EQ(counts.wrong, 1);
-  EXPECT_EQ(counts.ignored, 1);
-  EXPECT_DOUBLE_EQ(counts.recall(), 0.5);
-  EXPECT_DOUBLE_EQ(counts.precision(), 2.0 / 3.0);
-}
-
-TEST(CountDecisions, NothingFoundIsPreciseAndHasNoRecall) {
-  const DecisionCounts counts = count_decisions({}, {});
-  EXPECT_EQ(counts.recall(), 0.0);
-  EXPECT_EQ(counts.precision(), 1.0);
+TEST(EveryNth, KeepsTheFramesThatWereRead) {
+  const GroundTruth truth{
+      {{30, 0, 2}, {30, 7, 8}, {31, 0, 9}, {33, 6, 10}}, {{30, 1, 2}, {33, 9, 9}}, {0, 1, 33}};
+  const GroundTruth thirds = every_nth(truth, 3);
+  EXPECT_EQ(thirds.same_place, (std::vector<PlaceRun>{{10, 0, 0}, {11, 2, 3}}));
+  EXPECT_EQ(thirds.near_place, (std::vector<PlaceRun>{{11, 3, 3}}));
+  EXPECT_EQ(thirds.ignored, (std::vector<int>{0, 11}));
+  EXPECT_EQ(every_nth(truth, 1).same_place, truth.same_place);
+  EXPECT_EQ(every_nth({{{2147483646, 0, 2147483647}}, {}, {}}, 2).same_place,
+            (std::vector<PlaceRun>{{1073741823, 0, 1073741823}}));
+  test::expect_error(ErrorKind::option, {"every is 0"}, [&] { every_nth(truth, 0); });
 }
 
 }  // namespace

@@ -3,8 +3,6 @@
 #include "sequence_lists.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <cstdint>
 #include <string_view>
 #include <system_error>
@@ -13,6 +11,7 @@
 
 #include "loopbit/error.hpp"
 
+#include "cells.hpp"
 #include "image_file.hpp"
 #include "natural_order.hpp"
 #include "text_rows.hpp"
@@ -32,22 +31,8 @@ bool is_folder(const fs::path& path) {
   return fs::is_directory(path, error);
 }
 
-/// The number that is all of `text`.
-template <typename Number>
-std::optional<Number> parse(std::string_view text) {
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return number;
-}
-
-std::optional<double> parse_seconds(std::string_view text) {
-  const auto seconds = parse<double>(text);
-  return seconds && std::isfinite(*seconds) ? seconds : std::nullopt;
-}
-
 std::optional<double> parse_nanoseconds(std::string_view text) {
-  const auto nanoseconds = parse<std::int64_t>(text);
+  const auto nanoseconds = parse_number<std::int64_t>(text);
   if (!nanoseconds) return std::nullopt;
   return static_cast<double>(*nanoseconds) / 1e9;
 }
@@ -101,7 +86,7 @@ ImageList list_images(const fs::path& folder, std::string description) {
 std::vector<double> read_times(const fs::path& file) {
   std::vector<double> times;
   for (const TextRow& row : read_rows(file)) {
-    const auto seconds = parse_seconds(row.text);
+    const auto seconds = parse_number<double>(row.text);
     if (!seconds) throw_bad_row(file, row, "one time in seconds");
     times.push_back(*seconds);
   }
@@ -143,7 +128,7 @@ ImageList list_tum(const fs::path& folder) {
   ImageList list{folder, "TUM RGB-D sequence, rgb.txt", {}};
   for (const TextRow& row : read_rows(file)) {
     const auto [time, name] = split(row.text, " \t");
-    const auto seconds = parse_seconds(time);
+    const auto seconds = parse_number<double>(time);
     if (!seconds || name.empty()) throw_bad_row(file, row, "a timestamp in seconds and a path");
     list.images.push_back({std::string(name), seconds});
   }

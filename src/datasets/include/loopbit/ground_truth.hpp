@@ -23,12 +23,17 @@ struct GroundTruth {
   std::vector<int> ignored;          ///< queries that are not scored
 };
 
-/// Reads rows of `query,first,last`; blank lines and `#` comments are passed over. Throws Error
-/// (kind input) that names file and line for anything else.
+/// Reads rows of `query,first,last` or, all of them, `query,match` (spaces do for commas, too);
+/// blank lines, `#` comments and a first row of names are passed over. Throws Error (kind input)
+/// that names file and line for anything else.
 std::vector<PlaceRun> read_place_runs(const std::string& path);
 
 /// Reads the frame that begins each row; what follows a comma is a remark. Errors as above.
 std::vector<int> read_frame_list(const std::string& path);
+
+/// What `truth` says where only every `every`-th frame was read (1 = all), in the numbers of the
+/// frames read. Throws Error (kind option) if `every` is less than 1.
+GroundTruth every_nth(const GroundTruth& truth, int every);
 
 /// Writes rows of `query,first,last` under a line of `comment`. Throws Error (kind output).
 void write_place_runs(const std::string& path, const std::string& comment,

@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "loopbit/ground_truth.hpp"
+#include "loopbit/options.hpp"
+
+namespace loopbit {
+
+/// Where a camera stood and where it looked, in the frame of its world.
+struct CameraPose {
+  std::optional<double> timestamp_s;  ///< where the file has times
+  cv::Vec3d position_m;
+  cv::Vec3d ahead;  ///< the viewing direction (the camera's z axis), unit length
+};
+
+/// Reads poses, one a row: KITTI's (12 numbers: camera to world, 3 x 4) or a TUM trajectory's (8
+/// numbers: time, position, quaternion x y z w); rows of one kind, numbers separated by spaces or
+/// commas, `#` begins a comment. Throws Error (kind input) that names file and line.
+std::vector<CameraPose> read_poses(const std::string& path);
+
+/// The pose of each frame, none where it is not known: the nearest in time (at most
+/// kMaxPoseDelay_s away) where both have times, in whatever order; of equal times the first row
+/// counts. Else row by row. Throws Error (kind input) if neither way fits: times of which none are
+/// near, or no times and another number of rows.
+std::vector<std::optional<CameraPose>> poses_of_frames(
+    const std::vector<CameraPose>& poses, const std::vector<std::optional<double>>& times_s);
+
+inline constexpr double kMaxPoseDelay_s = 0.05;
+
+/// When two frames with known poses show the same place.
+struct PoseTruthOptions {
+  double radius_m = 6.0;
+  int min_gap_frames = 150;
+  double min_path_m = 0.0;
+  double max_heading_deg = 180.0;
+  double grey_radius_m = 0.0;
+
+  static constexpr auto fields() {
+    using S = PoseTruthOptions;
+    return std::tuple{
+        Field{"radius_m", &S::radius_m, 0.01, 1000.0, "same place: at most this far apart, m"},
+        Field{"min_gap_frames", &S::min_gap_frames, 1, 1'000'000,
+              "same place: more than so many frames apart"},
+        Field{"min_path_m", &S::min_path_m, 0.0, 1e6,
+              "same place: at least this much driven in between, m"},
+        Field{"max_heading_deg", &S::max_heading_deg, 1.0, 180.0,
+              "same place: viewing directions at most this far apart, degrees; 180 = any"},
+        Field{"grey_radius_m", &S::grey_radius_m, 0.0, 1000.0,
+              "a match up to this far away is not wrong, nor right by this alone, m; 0 = none"}};
+  }
+};
+
+/// What is true by poses: of each frame, the earlier frames that satisfy `options`; near_place
+/// holds those within the grey radius, whatever their heading, gap or path (and all of same_place).
+/// Frames without a pose are ignored queries, and near_place of each later query: nobody knows what
+/// they show. The path is measured between frames with poses. Throws Error (kind option) for an
+/// option out of range, (kind input) for a position that is not finite or over 1e9 m. Cost: grows
+/// with the pairs within reach, not with the square of the frames.
+GroundTruth truth_from_poses(const std::vector<std::optional<CameraPose>>& poses,
+                             const PoseTruthOptions& options = {});
+
+}  // namespace loopbit

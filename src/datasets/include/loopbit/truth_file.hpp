@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "loopbit/ground_truth.hpp"
+#include "loopbit/poses.hpp"
+
+namespace loopbit {
+
+/// What a file says places are the same by.
+enum class TruthKind {
+  runs,    ///< rows of query,first,last or query,match
+  matrix,  ///< a cell for every two frames
+  poses,   ///< where the camera stood
+};
+
+/// The kind of a file of ground truth, as read_truth would read it. Throws Error (kind input).
+TruthKind truth_kind(const std::string& path);
+
+/// How a file of ground truth is to be understood, where its kind leaves that open.
+struct TruthOptions {
+  PoseTruthOptions poses;
+  std::string variable;  ///< of a .mat file; empty = the only square matrix in it
+  int views = 1;         ///< a matrix has so many rows a frame in turn (2: left, right)
+};
+
+/// Reads what is true about a sequence, told by what the file is:
+///  - a .mat file of MATLAB 5 to 7.3: a square matrix, dense (at most 1 GiB) or sparse, of any
+///    numeric or logical class;
+///  - an image: a square mask, true where it is not black, and no JPEG, whose black is not;
+///  - text of 12 or 8 numbers a row: poses, see poses.hpp;
+///  - text of `query,first,last` or `query,match` rows, see ground_truth.hpp;
+///  - text of as many numbers a row as rows (at least 13): a square matrix.
+/// In a matrix, row and column are frames and any entry but 0 is true, above or below the diagonal:
+/// the later of two frames is the query. The diagonal says nothing. With `views` = n, frame k is
+/// rows n k to n k + n - 1, and two frames show the same place if any of their views do. At most
+/// 100,000 rows are read.
+///
+/// `times_s`: the frames' times, one a frame, where the sequence is known; needed for trajectories,
+/// and checked against the number of poses and of rows (0 frames = not known; rows may be more
+/// than frames, of a run that ended early, never fewer).
+/// Throws Error (kind input) that names file, fault and remedy. A 4541 x 4541 matrix takes well
+/// under a second.
+GroundTruth read_truth(const std::string& path, const TruthOptions& options = {},
+                       const std::vector<std::optional<double>>& times_s = {});
+
+}  // namespace loopbit

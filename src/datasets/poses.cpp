@@ -1,0 +1,146 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/poses.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+#include "cells.hpp"
+#include "text_rows.hpp"
+
+namespace loopbit {
+namespace {
+
+constexpr std::size_t kKittiColumns = 12;
+constexpr std::size_t kTumColumns = 8;
+
+/// Files are rounded; what is further than this from a rotation is something else.
+constexpr double kMaxRotationError = 0.01;
+
+using Numbers = std::array<double, kKittiColumns>;
+
+bool parse_numbers(const std::vector<std::string_view>& cells, Numbers& numbers) {
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const auto number = datasets::parse_number<double>(cells[i]);
+    if (!number) return false;
+    numbers[i] = *number;
+  }
+  return true;
+}
+
+std::optional<CameraPose> kitti_pose(const Numbers& n) {
+  const cv::Vec3d right(n[0], n[4], n[8]);
+  const cv::Vec3d down(n[1], n[5], n[9]);
+  const cv::Vec3d ahead(n[2], n[6], n[10]);
+  const bool is_rotation = cv::norm(right.cross(down) - ahead) <= kMaxRotationError &&
+                           cv::norm(down.cross(ahead) - right) <= kMaxRotationError &&
+                           std::abs(cv::norm(ahead) - 1.0) <= kMaxRotationError;
+  if (!is_rotation) return std::nullopt;
+  return CameraPose{{}, {n[3], n[7], n[11]}, cv::normalize(ahead)};
+}
+
+std::optional<CameraPose> tum_pose(const Numbers& n) {
+  cv::Vec4d q(n[4], n[5], n[6], n[7]);
+  const double length = cv::norm(q);
+  if (!(std::abs(length - 1.0) <= kMaxRotationError)) return std::nullopt;
+  q /= length;
+  const auto [x, y, z, w] = std::array{q[0], q[1], q[2], q[3]};
+  const cv::Vec3d ahead(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y));
+  return CameraPose{n[0], {n[1], n[2], n[3]}, cv::normalize(ahead)};
+}
+
+std::optional<CameraPose> parse_pose(const std::vector<std::string_view>& cells) {
+  Numbers numbers{};
+  if (cells.size() > numbers.size() || !parse_numbers(cells, numbers)) return std::nullopt;
+  return cells.size() == kTumColumns ? tum_pose(numbers) : kitti_pose(numbers);
+}
+
+struct TimedPose {
+  double time_s;
+  const CameraPose* pose;
+};
+
+/// The pose nearest to `time_s`, the earlier of two; `poses` are by time.
+const TimedPose& nearest(const std::vector<TimedPose>& poses, double time_s) {
+  const auto after = std::ranges::lower_bound(poses, time_s, {}, &TimedPose::time_s);
+  if (after == poses.begin()) return poses.front();
+  if (after == poses.end()) return poses.back();
+  const auto before = after - 1;
+  return time_s - before->time_s <= after->time_s - time_s ? *before : *after;
+}
+
+[[noreturn]] void throw_no_pose_in_time(const std::vector<TimedPose>& poses,
+                                        const std::vector<std::optional<double>>& times_s) {
+  const auto first = std::ranges::find_if(times_s, [](const auto& t) { return t.has_value(); });
+  throw Error(ErrorKind::input,
+              fmt::format("The poses begin at {:.6f} s and end at {:.6f} s, but no frame is within "
+                          "{} s of one (the first frame's time is {:.6f} s): give the trajectory "
+                          "of this sequence, with times by the same clock.",
+                          poses.front().time_s, poses.back().time_s, kMaxPoseDelay_s, **first));
+}
+
+std::vector<std::optional<CameraPose>> poses_by_time(
+    const std::vector<CameraPose>& poses, const std::vector<std::optional<double>>& times_s) {
+  std::vector<TimedPose> sorted;
+  sorted.reserve(poses.size());
+  for (const CameraPose& pose : poses) sorted.push_back({pose.timestamp_s.value(), &pose});
+  std::ranges::stable_sort(sorted, {}, &TimedPose::time_s);
+  std::vector<std::optional<CameraPose>> found(times_s.size());
+  bool any = false;
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    if (!times_s[i]) continue;
+    const TimedPose& near = nearest(sorted, *times_s[i]);
+    if (std::abs(near.time_s - *times_s[i]) > kMaxPoseDelay_s) continue;
+    found[i] = *near.pose;
+    any = true;
+  }
+  if (!any) throw_no_pose_in_time(sorted, times_s);
+  return found;
+}
+
+}  // namespace
+
+std::vector<CameraPose> read_poses(const std::string& path) {
+  std::vector<CameraPose> poses;
+  std::vector<std::string_view> cells;
+  std::size_t columns = 0;
+  for (const auto& row : datasets::read_rows(path)) {
+    datasets::split_cells(row.text, cells);
+    if (columns == 0) columns = cells.size() == kTumColumns ? kTumColumns : kKittiColumns;
+    const auto pose = cells.size() == columns ? parse_pose(cells) : std::nullopt;
+    if (!pose) {
+      datasets::throw_bad_row(path, row,
+                              columns == kTumColumns
+                                  ? "a TUM pose: time, position and unit quaternion x y z w"
+                                  : "a KITTI pose (12 numbers: 3 x 4, of a rotation and a "
+                                    "position) or a TUM pose (8 numbers)");
+    }
+    poses.push_back(*pose);
+  }
+  if (poses.empty()) {
+    throw Error(ErrorKind::input, fmt::format("'{}' has no pose: give it one row a pose.", path));
+  }
+  return poses;
+}
+
+std::vector<std::optional<CameraPose>> poses_of_frames(
+    const std::vector<CameraPose>& poses, const std::vector<std::optional<double>>& times_s) {
+  const auto has_time = [](const auto& time) { return time.has_value(); };
+  const bool poses_timed =
+      !poses.empty() && std::ranges::all_of(poses, has_time, &CameraPose::timestamp_s);
+  if (poses_timed && std::ranges::any_of(times_s, has_time)) return poses_by_time(poses, times_s);
+  if (poses.size() == times_s.size()) return {poses.begin(), poses.end()};
+  throw Error(ErrorKind::input,
+              fmt::format("There are {} poses but {} frames, and {} have no times to tell which "
+                          "belong together: give one pose a frame, or times for both.",
+                          poses.size(), times_s.size(), poses_timed ? "the frames" : "the poses"));
+}
+
+}  // namespace loopbit

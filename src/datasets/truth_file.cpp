@@ -1,0 +1,162 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/truth_file.hpp"
+
+#include <cstddef>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+#include "cells.hpp"
+#include "image_file.hpp"
+#include "mat_file.hpp"
+#include "text_rows.hpp"
+#include "truth_matrix.hpp"
+
+namespace loopbit {
+namespace {
+
+using datasets::TextRow;
+using datasets::TruthMatrix;
+using Times = std::vector<std::optional<double>>;
+
+constexpr std::size_t kFewestMatrixColumns = 13;
+
+/// Any of its channels.
+template <typename Level>
+bool is_set(const Level* pixel, int channels) {
+  for (int i = 0; i < channels; ++i) {
+    if (pixel[i] != 0) return true;
+  }
+  return false;
+}
+
+template <typename Level>
+void add_pixels(const cv::Mat& image, TruthMatrix& matrix) {
+  const int channels = image.channels();
+  for (int y = 0; y < image.rows; ++y) {
+    const auto* row = image.ptr<Level>(y);
+    for (int x = 0; x < image.cols; ++x) {
+      if (is_set(row + static_cast<std::ptrdiff_t>(x) * channels, channels)) {
+        matrix.add(static_cast<std::size_t>(y), static_cast<std::size_t>(x));
+      }
+    }
+  }
+}
+
+TruthMatrix read_mask(const std::string& path, int views) {
+  const std::string extension = datasets::lower_extension(path);
+  if (extension == ".jpg" || extension == ".jpeg") {
+    throw Error(ErrorKind::input,
+                fmt::format("Mask '{}' is a JPEG image, whose black is not quite black: give the "
+                            "original as PNG or .mat.",
+                            path));
+  }
+  const cv::Mat image = datasets::read_image_file(path);
+  const auto rows = static_cast<std::size_t>(image.rows);
+  TruthMatrix matrix(fmt::format("Mask '{}'", path), {rows, static_cast<std::size_t>(image.cols)},
+                     views);
+  if (image.depth() == CV_16U) {
+    add_pixels<std::uint16_t>(image, matrix);
+  } else {
+    add_pixels<std::uint8_t>(image, matrix);
+  }
+  return matrix;
+}
+
+TruthMatrix parse_matrix(const std::string& path, const std::vector<TextRow>& rows, int views) {
+  TruthMatrix matrix(fmt::format("Matrix '{}'", path), {rows.size(), rows.size()}, views);
+  std::vector<std::string_view> cells;
+  for (std::size_t y = 0; y < rows.size(); ++y) {
+    datasets::split_cells(rows[y].text, cells);
+    if (cells.size() != rows.size()) {
+      datasets::throw_bad_row(path, rows[y],
+                              fmt::format("{0} numbers, one for each of the {0} rows (not {1})",
+                                          rows.size(), cells.size()));
+    }
+    for (std::size_t x = 0; x < cells.size(); ++x) {
+      if (cells[x] == "0") continue;
+      const auto number = datasets::parse_number<double>(cells[x]);
+      if (!number) {
+        datasets::throw_bad_row(path, rows[y],
+                                fmt::format("all numbers, which '{}' is not", cells[x]));
+      }
+      if (*number != 0.0) matrix.add(y, x);
+    }
+  }
+  return matrix;
+}
+
+GroundTruth truth_of(const TruthMatrix& matrix, const std::string& path, const Times& times_s) {
+  if (matrix.frames() < times_s.size()) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' tells of {} frames, but the sequence has {}: give the ground "
+                            "truth of this sequence, with its number of views a frame.",
+                            path, matrix.frames(), times_s.size()));
+  }
+  return {matrix.runs(), {}, {}};
+}
+
+GroundTruth read_pose_truth(const std::string& path, const PoseTruthOptions& options,
+                            Times times_s) {
+  const std::vector<CameraPose> poses = read_poses(path);
+  if (!poses.front().timestamp_s) {
+    // The run may have ended early, or its sequence is not known.
+    if (poses.size() > times_s.size()) times_s.resize(poses.size());
+  } else if (times_s.empty()) {
+    throw Error(ErrorKind::input, fmt::format("Trajectory '{}' tells poses by time: give the "
+                                              "sequence as well, with the times of its frames.",
+                                              path));
+  }
+  return truth_from_poses(poses_of_frames(poses, times_s), options);
+}
+
+/// The kind of a text file by its first row. Throws if it is none.
+TruthKind text_kind(const std::string& path, const std::vector<TextRow>& rows) {
+  if (rows.empty()) return TruthKind::runs;
+  std::vector<std::string_view> cells;
+  datasets::split_cells(rows.front().text, cells);
+  if (cells.size() == 2 || cells.size() == 3) return TruthKind::runs;
+  if (cells.size() == 8 || cells.size() == 12) return TruthKind::poses;
+  if (cells.size() >= kFewestMatrixColumns) return TruthKind::matrix;
+  datasets::throw_bad_row(path, rows.front(),
+                          "query,first,last, or query,match, or a pose of 12 (KITTI) or 8 (TUM) "
+                          "numbers, or one of at least 13 rows of a square matrix");
+}
+
+bool is_mat_file(const std::string& path) { return datasets::lower_extension(path) == ".mat"; }
+
+}  // namespace
+
+TruthKind truth_kind(const std::string& path) {
+  if (is_mat_file(path) || datasets::is_image_name(path)) return TruthKind::matrix;
+  return text_kind(path, datasets::read_rows(path));
+}
+
+GroundTruth read_truth(const std::string& path, const TruthOptions& options,
+                       const std::vector<std::optional<double>>& times_s) {
+  if (options.views < 1) {
+    throw Error(ErrorKind::option,
+                fmt::format("views is {}, but must be 1 (a row a frame) or more.", options.views));
+  }
+  if (is_mat_file(path)) {
+    return truth_of(datasets::read_mat_file(path, options.variable, options.views), path, times_s);
+  }
+  if (datasets::is_image_name(path)) {
+    return truth_of(read_mask(path, options.views), path, times_s);
+  }
+  const std::vector<TextRow> rows = datasets::read_rows(path);
+  switch (text_kind(path, rows)) {
+    case TruthKind::runs:
+      return {read_place_runs(path), {}, {}};
+    case TruthKind::poses:
+      return read_pose_truth(path, options.poses, times_s);
+    case TruthKind::matrix:
+      return truth_of(parse_matrix(path, rows, options.views), path, times_s);
+  }
+  return {};
+}
+
+}  // namespace loopbit
