@@ -3,64 +3,190 @@
 #include "loopbit/evaluation.hpp"
 
 #include <algorithm>
-#include <unordered_map>
-#include <unordered_set>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
 
 namespace loopbit {
 namespace {
 
-/// Runs by query, so that a long sequence is scored in linear time.
-class RunsByQuery {
+double share(std::int64_t part, std::int64_t whole, double of_nothing) {
+  return whole == 0 ? of_nothing : static_cast<double>(part) / static_cast<double>(whole);
+}
+
+/// Of each query the best-scored match, the first of equals; ordered by query.
+std::map<int, ReportedMatch> best_by_query(const std::vector<ReportedMatch>& matches,
+                                           bool accepted_only) {
+  std::map<int, ReportedMatch> best;
+  for (const ReportedMatch& match : matches) {
+    if (accepted_only && !match.is_loop) continue;
+    const auto [entry, is_new] = best.try_emplace(match.query, match);
+    if (!is_new && match.score > entry->second.score) entry->second = match;
+  }
+  return best;
+}
+
+/// One evaluation in the making.
+class Scorer {
  public:
-  explicit RunsByQuery(const std::vector<PlaceRun>& runs) {
-    for (const PlaceRun& run : runs) runs_[run.query].push_back(run);
+  Scorer(const MatchList& list, const GroundTruth& truth, const EvaluationOptions& options)
+      : list_(list), judge_(truth, options) {
+    result_.options = options;
+    for (const PlaceRun& run : truth.same_place) {
+      if (!is_scored(run.query)) continue;
+      positives_.insert(run.query);
+      result_.pairs.positives += run.last - run.first + 1;
+    }
+    result_.decision.positives = static_cast<int>(positives_.size());
+    result_.decision.ignored = count_ignored(truth);
   }
 
-  [[nodiscard]] bool has(int query) const { return runs_.contains(query); }
-
-  [[nodiscard]] bool has(int query, int match) const {
-    const auto found = runs_.find(query);
-    return found != runs_.end() &&
-           std::any_of(found->second.begin(), found->second.end(), [&](const PlaceRun& run) {
-             return run.first <= match && match <= run.last;
-           });
+  Evaluation score() && {
+    score_decisions();
+    score_pairs();
+    sweep();
+    return std::move(result_);
   }
 
  private:
-  std::unordered_map<int, std::vector<PlaceRun>> runs_;
+  [[nodiscard]] bool is_scored(int query) const {
+    const bool is_past_end =
+        !list_.times_s.empty() && static_cast<std::size_t>(query) >= list_.times_s.size();
+    return !is_past_end && !judge_.is_ignored(query);
+  }
+
+  /// Frames of the list where it lists them, else queries it speaks of.
+  [[nodiscard]] int count_ignored(const GroundTruth& truth) const {
+    std::set<int> ignored;
+    if (list_.times_s.empty()) {
+      for (const ReportedMatch& match : list_.matches) {
+        if (judge_.is_ignored(match.query)) ignored.insert(match.query);
+      }
+    } else {
+      const auto end = static_cast<int>(list_.times_s.size());
+      for (const int query : truth.ignored) {
+        if (query < end) ignored.insert(query);
+      }
+    }
+    return static_cast<int>(ignored.size());
+  }
+
+  void score_decisions() {
+    std::set<int> found;
+    for (const auto& [query, match] : best_by_query(list_.matches, true)) {
+      if (!is_scored(query)) continue;
+      switch (judge_.judge(query, match.match)) {
+        case Judgement::right:
+          ++result_.decision.right;
+          found.insert(query);
+          break;
+        case Judgement::tolerated:
+          ++result_.decision.tolerated;
+          break;
+        case Judgement::wrong:
+          ++result_.decision.wrong;
+          result_.wrong_loops.push_back(match);
+          break;
+      }
+    }
+    std::set_difference(positives_.begin(), positives_.end(), found.begin(), found.end(),
+                        std::back_inserter(result_.missed));
+  }
+
+  void score_pairs() {
+    std::set<std::pair<int, int>> seen;
+    for (const ReportedMatch& match : list_.matches) {
+      if (!match.is_loop || !is_scored(match.query)) continue;
+      if (!seen.emplace(match.query, match.match).second) continue;
+      const Judgement judgement = judge_.judge(match.query, match.match);
+      if (judgement == Judgement::right) ++result_.pairs.right;
+      if (judgement == Judgement::wrong) ++result_.pairs.wrong;
+    }
+  }
+
+  void sweep() {
+    std::vector<ReportedMatch> ranked;
+    for (const auto& [query, match] : best_by_query(list_.matches, false)) {
+      if (is_scored(query)) ranked.push_back(match);
+    }
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const auto& a, const auto& b) { return a.score > b.score; });
+    CurvePoint point;
+    for (std::size_t i = 0; i < ranked.size(); ++i) {
+      const Judgement judgement = judge_.judge(ranked[i].query, ranked[i].match);
+      if (judgement == Judgement::right) ++point.right;
+      if (judgement == Judgement::wrong) ++point.wrong;
+      const bool is_last_of_equals =
+          i + 1 == ranked.size() || ranked[i + 1].score < ranked[i].score;
+      if (is_last_of_equals) add_point(point, ranked[i].score);
+    }
+  }
+
+  void add_point(CurvePoint point, double score) {
+    point.score = score;
+    point.precision = share(point.right, point.right + point.wrong, 1.0);
+    point.recall = share(point.right, result_.decision.positives, 0.0);
+    const double recall_before = result_.curve.empty() ? 0.0 : result_.curve.back().recall;
+    result_.average_precision += point.precision * (point.recall - recall_before);
+    if (point.wrong == 0) {
+      result_.recall_at_full_precision = point.recall;
+      result_.score_at_full_precision = score;
+    }
+    result_.curve.push_back(point);
+  }
+
+  const MatchList& list_;
+  Judge judge_;
+  std::set<int> positives_;
+  Evaluation result_;
 };
 
 }  // namespace
 
-double DecisionCounts::recall() const {
-  return positives == 0 ? 0.0 : static_cast<double>(right) / positives;
+Judge::Judge(const GroundTruth& truth, const EvaluationOptions& options)
+    : tolerance_frames_(options.tolerance_frames),
+      ignored_(truth.ignored.begin(), truth.ignored.end()) {
+  for (const PlaceRun& run : truth.same_place) same_place_[run.query].push_back(run);
+  for (const PlaceRun& run : truth.near_place) near_place_[run.query].push_back(run);
 }
 
-double DecisionCounts::precision() const {
-  return right + wrong == 0 ? 1.0 : static_cast<double>(right) / (right + wrong);
+bool Judge::lists(const RunsByQuery& runs, int query, int match, int tolerance) {
+  const auto found = runs.find(query);
+  return found != runs.end() &&
+         std::any_of(found->second.begin(), found->second.end(), [&](const PlaceRun& run) {
+           return match >= run.first - tolerance && match <= run.last + tolerance;
+         });
 }
 
-DecisionCounts count_decisions(std::span<const Detection> detections, const GroundTruth& truth) {
-  const RunsByQuery same_place(truth.same_place);
-  const RunsByQuery near_place(truth.near_place);
-  const std::unordered_set<int> ignored(truth.ignored.begin(), truth.ignored.end());
-  DecisionCounts counts;
-  for (const Detection& detection : detections) {
-    if (ignored.contains(detection.frame)) {
-      ++counts.ignored;
-      continue;
-    }
-    if (same_place.has(detection.frame)) ++counts.positives;
-    if (detection.status != Status::loop) continue;
-    if (same_place.has(detection.frame, *detection.match)) {
-      ++counts.right;
-    } else if (near_place.has(detection.frame, *detection.match)) {
-      ++counts.tolerated;
-    } else {
-      ++counts.wrong;
-    }
-  }
-  return counts;
+Judgement Judge::judge(int query, int match) const {
+  if (lists(same_place_, query, match, tolerance_frames_)) return Judgement::right;
+  return lists(near_place_, query, match, 0) ? Judgement::tolerated : Judgement::wrong;
+}
+
+bool Judge::is_positive(int query) const {
+  return same_place_.contains(query) && !is_ignored(query);
+}
+
+Interval wilson_interval(std::int64_t hits, std::int64_t trials) {
+  if (trials == 0) return {};
+  constexpr double kZ = 1.959963984540054;  // the normal distribution's 97.5 % quantile
+  const auto n = static_cast<double>(trials);
+  const double p = static_cast<double>(hits) / n;
+  const double scale = 1.0 / (1.0 + kZ * kZ / n);
+  const double middle = scale * (p + kZ * kZ / (2.0 * n));
+  const double half = scale * kZ * std::sqrt(p * (1.0 - p) / n + kZ * kZ / (4.0 * n * n));
+  return {std::max(0.0, middle - half), std::min(1.0, middle + half)};
+}
+
+double DecisionCounts::recall() const { return share(right, positives, 0.0); }
+double DecisionCounts::precision() const { return share(right, right + wrong, 1.0); }
+double PairCounts::recall() const { return share(right, positives, 0.0); }
+double PairCounts::precision() const { return share(right, right + wrong, 1.0); }
+
+Evaluation evaluate(const MatchList& list, const GroundTruth& truth,
+                    const EvaluationOptions& options) {
+  return Scorer(list, truth, options).score();
 }
 
 }  // namespace loopbit

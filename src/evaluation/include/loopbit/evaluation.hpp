@@ -2,20 +2,69 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <span>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
 
-#include "loopbit/detection.hpp"
 #include "loopbit/ground_truth.hpp"
+#include "loopbit/match_list.hpp"
 
 namespace loopbit {
 
-/// What the decisions of a run come to. A query with a true earlier place is positive.
+struct EvaluationOptions {
+  int tolerance_frames = 0;   ///< a match so near to a true earlier place is right, too
+  std::string protocol = {};  ///< its name, for the record; empty if it has none
+};
+
+/// What truth says about one reported match.
+enum class Judgement {
+  right,      ///< a true earlier place, or within the tolerance of one
+  tolerated,  ///< near enough not to be wrong: listed as near_place
+  wrong,      ///< neither
+};
+
+/// Ground truth, made ready to judge many matches. Cost of a question: the runs of its query.
+class Judge {
+ public:
+  explicit Judge(const GroundTruth& truth, const EvaluationOptions& options = {});
+
+  [[nodiscard]] Judgement judge(int query, int match) const;
+  /// Whether `query` is scored and has a true earlier place: whether it is a revisit.
+  [[nodiscard]] bool is_positive(int query) const;
+  [[nodiscard]] bool is_ignored(int query) const { return ignored_.contains(query); }
+
+ private:
+  using RunsByQuery = std::unordered_map<int, std::vector<PlaceRun>>;
+
+  [[nodiscard]] static bool lists(const RunsByQuery& runs, int query, int match, int tolerance);
+
+  int tolerance_frames_;
+  RunsByQuery same_place_;
+  RunsByQuery near_place_;
+  std::unordered_set<int> ignored_;
+};
+
+/// How far the true share may be from the observed one.
+struct Interval {
+  double low = 0;
+  double high = 1;
+};
+
+/// Wilson's interval (1927) for the share of `hits` in `trials`, at 95 %: also right where all or
+/// none hit. [0, 1] without trials.
+[[nodiscard]] Interval wilson_interval(std::int64_t hits, std::int64_t trials);
+
+/// What the decisions of a detector come to, query by query. A query's best-scored accepted match
+/// speaks for it (the first of equals).
 struct DecisionCounts {
-  int positives = 0;  ///< positive queries that are scored
-  int right = 0;      ///< loops whose match is a true earlier place
-  int tolerated = 0;  ///< loops whose match is near enough not to be wrong
-  int wrong = 0;      ///< all other loops
-  int ignored = 0;    ///< frames left out of the score
+  int positives = 0;  ///< queries that are scored and have a true earlier place
+  int right = 0;
+  int tolerated = 0;
+  int wrong = 0;
+  int ignored = 0;  ///< queries left out of the score
 
   /// right / positives; 0 without positives.
   [[nodiscard]] double recall() const;
@@ -23,7 +72,47 @@ struct DecisionCounts {
   [[nodiscard]] double precision() const;
 };
 
-/// Scores the shipped decision (status loop or not) of each frame against `truth`.
-DecisionCounts count_decisions(std::span<const Detection> detections, const GroundTruth& truth);
+/// What they come to pair by pair: every accepted match counts, and so does every true pair of
+/// frames, however many a query has.
+struct PairCounts {
+  std::int64_t positives = 0;
+  std::int64_t right = 0;
+  std::int64_t wrong = 0;
+
+  [[nodiscard]] double recall() const;
+  [[nodiscard]] double precision() const;
+};
+
+/// All queries whose best match, accepted or not, has at least this score.
+struct CurvePoint {
+  double score = 0;
+  int right = 0;
+  int wrong = 0;
+  double precision = 1;
+  double recall = 0;
+};
+
+/// How good a detector's matches are; see docs/evaluation.md.
+struct Evaluation {
+  EvaluationOptions options;
+  DecisionCounts decision;  ///< as shipped
+  PairCounts pairs;         ///< as shipped
+  /// One point for each score that occurs, from the highest: equal scores are accepted all or none.
+  std::vector<CurvePoint> curve;
+  double recall_at_full_precision = 0;
+  /// The lowest score with no wrong match at it or above; none if even the highest has one.
+  std::optional<double> score_at_full_precision;
+  double average_precision = 0;            ///< sum of precision times gain of recall over `curve`
+  std::vector<ReportedMatch> wrong_loops;  ///< accepted, by query
+  std::vector<int> missed;                 ///< positive queries without a right loop
+};
+
+/// Scores `list` against `truth`. Queries past the end of a list that has one (times_s) do not
+/// count. Cost: sorting the matches.
+Evaluation evaluate(const MatchList& list, const GroundTruth& truth,
+                    const EvaluationOptions& options = {});
+
+/// As JSON. `full` adds the curve, the wrong loops and the missed queries.
+std::string to_json(const Evaluation& evaluation, bool full);
 
 }  // namespace loopbit

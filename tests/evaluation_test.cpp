@@ -1,0 +1,255 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/evaluation.hpp"
+
+#include <algorithm>
+#include <set>
+
+#include <nlohmann/json.hpp>
+
+#include "loopbit/match_list.hpp"
+#include "loopbit/protocol.hpp"
+#include "loopbit/truth_file.hpp"
+
+#include "test_support.hpp"
+
+namespace loopbit {
+namespace {
+
+using Json = nlohmann::json;
+
+ReportedMatch loop(int query, int match, double score = 1.0) { return {query, match, score, true}; }
+ReportedMatch rejected(int query, int match, double score) { return {query, match, score, false}; }
+
+MatchList of_frames(std::vector<ReportedMatch> matches, std::size_t frames) {
+  return {std::move(matches), std::vector<std::optional<double>>(frames)};
+}
+
+TEST(Evaluate, TellsRightToleratedWrongMissedAndIgnored) {
+  const GroundTruth truth{{{10, 0, 2}, {11, 1, 3}, {12, 2, 4}, {13, 3, 5}, {13, 8, 8}, {14, 4, 6}},
+                          {{11, 0, 5}, {15, 0, 1}},
+                          {14}};
+  const MatchList list = of_frames(
+      {
+          loop(9, 0),            // no such place: wrong
+          loop(10, 2),           // right
+          loop(11, 5),           // near: tolerated, and the revisit is missed
+          rejected(12, 3, 0.5),  // the right match, but not accepted: missed
+          loop(13, 8),           // right by its second run
+          loop(14, 0),           // ignored, else wrong
+          loop(15, 1),           // no revisit, but near
+      },
+      17);
+  const Evaluation evaluation = evaluate(list, truth);
+  EXPECT_EQ(evaluation.decision.positives, 4);
+  EXPECT_EQ(evaluation.decision.right, 2);
+  EXPECT_EQ(evaluation.decision.tolerated, 2);
+  EXPECT_EQ(evaluation.decision.wrong, 1);
+  EXPECT_EQ(evaluation.decision.ignored, 1);
+  EXPECT_DOUBLE_EQ(evaluation.decision.recall(), 0.5);
+  EXPECT_DOUBLE_EQ(evaluation.decision.precision(), 2.0 / 3.0);
+  EXPECT_EQ(evaluation.wrong_loops, (std::vector<ReportedMatch>{loop(9, 0)}));
+  EXPECT_EQ(evaluation.missed, (std::vector<int>{11, 12}));
+  EXPECT_EQ(evaluation.pairs.positives, 13);
+  EXPECT_EQ(evaluation.pairs.right, 2);
+  EXPECT_EQ(evaluation.pairs.wrong, 1);
+}
+
+TEST(Evaluate, NothingFoundIsPreciseAndHasNoRecall) {
+  const Evaluation evaluation = evaluate({}, {{{5, 0, 0}}, {}, {}});
+  EXPECT_EQ(evaluation.decision.recall(), 0.0);
+  EXPECT_EQ(evaluation.decision.precision(), 1.0);
+  EXPECT_EQ(evaluation.average_precision, 0.0);
+  EXPECT_EQ(evaluation.score_at_full_precision, std::nullopt);
+  EXPECT_TRUE(evaluation.curve.empty());
+  EXPECT_EQ(evaluate({}, {}).decision.recall(), 0.0);
+}
+
+TEST(Evaluate, RevisitsAfterTheEndOfARunDoNotCount) {
+  const GroundTruth truth{{{5, 0, 1}, {9, 0, 1}}, {}, {9}};
+  EXPECT_EQ(evaluate(of_frames({loop(5, 0)}, 6), truth).decision.positives, 1);
+  EXPECT_EQ(evaluate(of_frames({}, 5), truth).decision.positives, 0);
+  EXPECT_EQ(evaluate(of_frames({}, 5), truth).pairs.positives, 0);
+  EXPECT_EQ(evaluate(of_frames({}, 5), truth).decision.ignored, 0);
+  EXPECT_EQ(evaluate(of_frames({}, 10), truth).decision.ignored, 1);
+}
+
+TEST(Evaluate, ToleranceIsCountedInFramesFromTheNearestTruePlace) {
+  const GroundTruth truth{{{100, 20, 30}}, {}, {}};
+  for (const int match : {10, 20, 30, 40}) {
+    EXPECT_EQ(evaluate({{loop(100, match)}, {}}, truth, {10}).decision.right, 1) << match;
+  }
+  for (const int match : {9, 41}) {
+    EXPECT_EQ(evaluate({{loop(100, match)}, {}}, truth, {10}).decision.wrong, 1) << match;
+  }
+}
+
+TEST(Evaluate, TheBestMatchSpeaksForAQueryAndEveryPairForItself) {
+  const GroundTruth truth{{{10, 0, 2}}, {}, {}};
+  const MatchList list{{loop(10, 7, 1.0), loop(10, 1, 3.0), loop(10, 2, 2.0), loop(10, 2, 2.0)},
+                       {}};
+  const Evaluation evaluation = evaluate(list, truth);
+  EXPECT_EQ(evaluation.decision.right, 1);
+  EXPECT_EQ(evaluation.decision.wrong, 0);
+  EXPECT_EQ(evaluation.pairs.right, 2);
+  EXPECT_EQ(evaluation.pairs.wrong, 1);
+  EXPECT_EQ(evaluation.pairs.positives, 3);
+  EXPECT_DOUBLE_EQ(evaluation.pairs.recall(), 2.0 / 3.0);
+  EXPECT_DOUBLE_EQ(evaluation.pairs.precision(), 2.0 / 3.0);
+}
+
+TEST(Evaluate, EqualScoresAreAcceptedAllOrNone) {
+  const GroundTruth truth{{{10, 0, 0}, {11, 0, 0}, {12, 0, 0}, {13, 0, 0}}, {}, {}};
+  const MatchList list{{loop(10, 0, 9.0), loop(11, 0, 5.0), loop(12, 7, 5.0), loop(13, 0, 5.0)},
+                       {}};
+  const Evaluation evaluation = evaluate(list, truth);
+  ASSERT_EQ(evaluation.curve.size(), 2U);
+  EXPECT_EQ(evaluation.curve[0].right, 1);
+  EXPECT_EQ(evaluation.curve[1].right, 3);
+  EXPECT_EQ(evaluation.curve[1].wrong, 1);
+  EXPECT_DOUBLE_EQ(evaluation.recall_at_full_precision, 0.25);
+  EXPECT_EQ(evaluation.score_at_full_precision, 9.0);
+  // 0.25 of the recall at precision 1, 0.5 of it at 3/4.
+  EXPECT_DOUBLE_EQ(evaluation.average_precision, 0.25 + 0.5 * 0.75);
+}
+
+TEST(Evaluate, TheSweepTakesRejectedMatchesToo) {
+  const GroundTruth truth{{{10, 0, 0}, {11, 0, 0}}, {}, {}};
+  const Evaluation evaluation =
+      evaluate({{loop(10, 0, 20.0), rejected(11, 0, 10.0), rejected(12, 3, 4.0)}, {}}, truth);
+  EXPECT_DOUBLE_EQ(evaluation.decision.recall(), 0.5);
+  EXPECT_DOUBLE_EQ(evaluation.recall_at_full_precision, 1.0);
+  EXPECT_EQ(evaluation.score_at_full_precision, 10.0);
+  EXPECT_DOUBLE_EQ(evaluation.curve.back().precision, 2.0 / 3.0);
+}
+
+/// The same numbers from their definitions, for every threshold anew.
+void expect_as_defined(const MatchList& list, const GroundTruth& truth) {
+  const Evaluation evaluation = evaluate(list, truth);
+  const auto is_true = [&](const ReportedMatch& m) {
+    return std::any_of(truth.same_place.begin(), truth.same_place.end(), [&](const PlaceRun& run) {
+      return run.query == m.query && run.first <= m.match && m.match <= run.last;
+    });
+  };
+  std::set<int> positives;
+  for (const PlaceRun& run : truth.same_place) positives.insert(run.query);
+  std::set<double, std::greater<>> thresholds;
+  for (const ReportedMatch& m : list.matches) thresholds.insert(m.score);
+  double best_recall = 0;
+  double average_precision = 0;
+  double recall_before = 0;
+  std::size_t point = 0;
+  for (const double threshold : thresholds) {
+    int right = 0;
+    int wrong = 0;
+    for (const ReportedMatch& m : list.matches) {
+      if (m.score < threshold) continue;
+      ++(is_true(m) ? right : wrong);
+    }
+    const double recall = static_cast<double>(right) / static_cast<double>(positives.size());
+    const double precision = static_cast<double>(right) / (right + wrong);
+    average_precision += precision * (recall - recall_before);
+    recall_before = recall;
+    if (wrong == 0) best_recall = recall;
+    ASSERT_LT(point, evaluation.curve.size());
+    EXPECT_EQ(evaluation.curve[point].score, threshold);
+    EXPECT_DOUBLE_EQ(evaluation.curve[point].recall, recall);
+    EXPECT_DOUBLE_EQ(evaluation.curve[point].precision, precision);
+    ++point;
+  }
+  EXPECT_EQ(point, evaluation.curve.size());
+  EXPECT_DOUBLE_EQ(evaluation.recall_at_full_precision, best_recall);
+  EXPECT_NEAR(evaluation.average_precision, average_precision, 1e-12);
+}
+
+TEST(Evaluate, IsAsDefinedOnRandomLists) {
+  for (int stream = 0; stream < 50; ++stream) {
+    test::Random random(stream);
+    GroundTruth truth;
+    MatchList list;
+    for (int query = 50; query < 120; ++query) {
+      if (random.uniform() < 0.5) {
+        const int first = random.between(0, 40);
+        truth.same_place.push_back({query, first, first + random.between(0, 9)});
+      }
+      if (random.uniform() < 0.8) {
+        const int match = random.between(0, 49);
+        // Few scores, so that many are equal.
+        list.matches.push_back(loop(query, match, random.between(0, 12)));
+      }
+    }
+    expect_as_defined(list, truth);
+  }
+}
+
+TEST(WilsonInterval, AgreesWithPublishedValues) {
+  // Newcombe 1998, table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+  const auto expect = [](Interval interval, double low, double high) {
+    EXPECT_NEAR(interval.low, low, 5e-5);
+    EXPECT_NEAR(interval.high, high, 5e-5);
+  };
+  expect(wilson_interval(81, 263), 0.2553, 0.3662);
+  expect(wilson_interval(15, 148), 0.0624, 0.1605);
+  expect(wilson_interval(0, 20), 0.0000, 0.1611);
+  expect(wilson_interval(1, 29), 0.0061, 0.1718);
+  expect(wilson_interval(0, 0), 0.0, 1.0);
+}
+
+TEST(EvaluationJson, SaysWhatTheEvaluationDoes) {
+  const GroundTruth truth{{{10, 0, 2}, {11, 0, 2}}, {}, {}};
+  const Evaluation evaluation = evaluate({{loop(10, 1, 9.5), loop(12, 3, 8.0)}, {}}, truth);
+  const Json json = Json::parse(to_json(evaluation, true));
+  EXPECT_EQ(json["protocol"], nullptr);
+  EXPECT_EQ(json["tolerance_frames"], 0);
+  EXPECT_EQ(json["positives"], 2);
+  EXPECT_EQ(json["right"], 1);
+  EXPECT_EQ(json["wrong"], 1);
+  EXPECT_EQ(json["recall"], 0.5);
+  EXPECT_EQ(json["precision"], 0.5);
+  EXPECT_EQ(json["recall_at_full_precision"], 0.5);
+  EXPECT_EQ(json["score_at_full_precision"], 9.5);
+  EXPECT_EQ(json["pairs"]["positives"], 6);
+  EXPECT_EQ(json["curve"].size(), 2U);
+  EXPECT_EQ(json["wrong_loops"], Json::parse(R"([{"query": 12, "match": 3, "score": 8.0}])"));
+  EXPECT_EQ(json["missed"], Json::parse("[11]"));
+  const Json brief = Json::parse(to_json(evaluation, false));
+  EXPECT_FALSE(brief.contains("curve"));
+  EXPECT_EQ(brief["recall"], json["recall"]);
+}
+
+TEST(Protocol, IsFoundByNameOrItsNamesAreListed) {
+  EXPECT_EQ(find_protocol("ibow-lcd").tolerance_frames, 40);
+  EXPECT_EQ(find_protocol("kitti").truth.poses.min_gap_frames, 150);
+  test::expect_error(ErrorKind::option, {"'orb'", "kitti", "ibow-lcd", "tsintotas", "fab-map"},
+                     [] { (void)find_protocol("orb"); });
+}
+
+TEST(PublishedResults, IbowLcdOnCityCentre) {
+  LOOPBIT_NEEDS_DATA("truth");
+  const std::string folder = (*test::data_dir() / "truth").string();
+  const Protocol& protocol = find_protocol("ibow-lcd");
+  const GroundTruth truth = read_truth(folder + "/mat/city_centre_htmap.mat", protocol.truth);
+  const MatchList list = read_match_list(folder + "/published/ibow_lcd_city_centre.csv");
+  const Evaluation evaluation = evaluate(list, truth, protocol.evaluation());
+  EXPECT_EQ(evaluation.decision.positives, 561);
+  EXPECT_EQ(evaluation.decision.right, 495);
+  EXPECT_EQ(evaluation.decision.wrong, 0);
+  EXPECT_NEAR(evaluation.decision.recall(), 0.8824, 5e-5);
+  EXPECT_NEAR(evaluation.recall_at_full_precision, 0.8824, 5e-5);
+  // By the cell itself one match is off; numbers of different protocols must not be mixed.
+  EXPECT_EQ(evaluate(list, truth).decision.right, 494);
+}
+
+TEST(PublishedResults, OtherMatricesSayOtherThings) {
+  LOOPBIT_NEEDS_DATA("truth");
+  const std::string folder = (*test::data_dir() / "truth").string();
+  const MatchList list = read_match_list(folder + "/published/ibow_lcd_city_centre.csv");
+  const GroundTruth truth = read_truth(folder + "/mat/groundTruthCityCentre.mat");
+  const Evaluation exact = evaluate(list, truth);
+  EXPECT_EQ(exact.decision.positives, 547);
+  EXPECT_EQ(exact.decision.right, 481);
+  EXPECT_EQ(evaluate(list, truth, {40}).decision.right, 489);
+}
+
+}  // namespace
+}  // namespace loopbit
