@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/evaluation.hpp"
+#include "loopbit/finished_run.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 
@@ -37,7 +38,7 @@ GroundTruth read_truth(const std::string& truth, const std::string& not_false = 
 }
 
 DecisionCounts score(const std::string& name, const std::string& input, const GroundTruth& truth) {
-  const DecisionCounts counts = count_decisions(detect_all(input), truth);
+  const DecisionCounts counts = evaluate(match_list(detect_all(input)), truth).decision;
   fmt::print("{}: {} of {} revisits found, recall {:.3f}; {} wrong\n", name, counts.right,
              counts.positives, counts.recall(), counts.wrong);
   return counts;

@@ -1,9 +1,15 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <utility>
 
+#include <opencv2/imgcodecs.hpp>
+
+#include "loopbit/evidence_file.hpp"
+#include "loopbit/finished_run.hpp"
 #include "loopbit/run_folder.hpp"
 #include "loopbit/runner.hpp"
 
@@ -62,6 +68,184 @@ TEST_F(RunFolderTest, OverwritingKeepsOtherFiles) {
 TEST_F(RunFolderTest, AFolderThatCannotBeMadeIsNamed) {
   const std::string file = write("file", "");
   test::expect_error(ErrorKind::output, {file}, [&] { RunFolder(file + "/run", false); });
+}
+
+std::vector<Detection> four_detections() {
+  return {{.frame = 0, .timestamp_s = 0.5},
+          {.frame = 1,
+           .timestamp_s = 1.25,
+           .status = Status::loop,
+           .match = 0,
+           .score = 20.5,
+           .similarity = 0.25,
+           .matches = 30,
+           .inliers = 21,
+           .times = {1.0, 0.5, 12.25, 3.0}},
+          {.frame = 2, .status = Status::unreadable},
+          {.frame = 3, .status = Status::no_geometry, .match = 1, .score = 0.0, .matches = 9}};
+}
+
+TEST_F(RunFolderTest, WhatWasWrittenIsRead) {
+  const GroundTruth truth{{{1, 0, 0}, {3, 0, 1}}, {{3, 0, 2}}, {2}};
+  const std::vector<std::optional<cv::Vec3d>> positions{cv::Vec3d(0.5, -2.0, 1e3), std::nullopt,
+                                                        cv::Vec3d(1, 2, 3), cv::Vec3d(0, 0, 0)};
+  RunFolder folder(path("run"), false);
+  for (const Detection& detection : four_detections()) folder.add(detection);
+  folder.write_truth(truth);
+  folder.write_positions(positions);
+  folder.finish({});
+
+  const FinishedRun run = read_run(path("run"));
+  ASSERT_EQ(run.detections.size(), 4U);
+  for (std::size_t i = 0; i < 4; ++i) {
+    const Detection expected = four_detections()[i];
+    const Detection& read = run.detections[i];
+    EXPECT_EQ(read.frame, expected.frame);
+    EXPECT_EQ(read.timestamp_s, expected.timestamp_s);
+    EXPECT_EQ(read.status, expected.status);
+    EXPECT_EQ(read.match, expected.match);
+    EXPECT_EQ(read.score, expected.score);
+    EXPECT_EQ(read.similarity, expected.similarity);
+    EXPECT_EQ(read.matches, expected.matches);
+    EXPECT_EQ(read.inliers, expected.inliers);
+    EXPECT_EQ(total_ms(read.times), total_ms(expected.times));
+  }
+  ASSERT_TRUE(run.truth.has_value());
+  EXPECT_EQ(run.truth->same_place, truth.same_place);
+  EXPECT_EQ(run.truth->near_place, truth.near_place);
+  EXPECT_EQ(run.truth->ignored, truth.ignored);
+  EXPECT_EQ(run.positions_m, positions);
+  EXPECT_NE(run.record_json.find("\"stopped_by\""), std::string::npos);
+  EXPECT_EQ(run.evidence_path, "");
+  const MatchList list = match_list(run.detections);
+  EXPECT_EQ(list.times_s.size(), 4U);
+  EXPECT_EQ(list.matches, (std::vector<ReportedMatch>{{1, 0, 20.5, true}, {3, 1, 0.0, false}}));
+}
+
+TEST_F(RunFolderTest, ACutOffListGivesItsWholeRowsAndNeverMore) {
+  RunFolder folder(path("run"), false);
+  for (const Detection& detection : four_detections()) folder.add(detection);
+  std::ifstream file(path("run/loops.csv"), std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  for (std::size_t bytes = text.find('\n') + 1; bytes <= text.size(); ++bytes) {
+    const std::string cut = write("cut.csv", text.substr(0, bytes));
+    const auto rows = std::count(text.begin(), text.begin() + static_cast<long>(bytes), '\n') - 1;
+    EXPECT_EQ(read_detections(cut).size(), static_cast<std::size_t>(rows)) << bytes;
+  }
+  test::expect_error(ErrorKind::input, {"begin"},
+                     [&] { (void)read_detections(write("c", "a\n")); });
+}
+
+TEST_F(RunFolderTest, AChangedRowIsNamed) {
+  const std::string header = std::string(kLoopsHeader) + "\n";
+  const auto expect_refused = [&](const std::string& row, std::string_view part) {
+    const std::string file = write("loops.csv", header + row + "\n");
+    test::expect_error(ErrorKind::input, {file, "line 2", part},
+                       [&] { (void)read_detections(file); });
+  };
+  expect_refused("0,,loop,0,1,0,0,0,0,0,0", "11 columns");
+  expect_refused("0,,maybe,0,1,0,0,0,0,0,0,0", "'maybe'");
+  expect_refused("0,,loop,x,1,0,0,0,0,0,0,0", "'x'");
+  expect_refused("1,,loop,0,1,0,0,0,0,0,0,0", "'1'");
+  test::expect_error(ErrorKind::input, {path("none"), "loops.csv"},
+                     [&] { (void)read_run(path("none")); });
+}
+
+TEST_F(RunFolderTest, AReplacedRunLeavesNothingBeside) {
+  {
+    RunFolder folder(path("run"), false);
+    folder.write_truth({});
+    folder.write_positions({std::nullopt});
+    (void)write("run/report.html", "old");
+    (void)write("run/evidence.db-wal", "old");
+    folder.finish({});
+  }
+  const RunFolder replaced(path("run"), true);
+  EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 1);
+}
+
+class EvidenceFileTest : public test::ScratchTest {
+ protected:
+  /// Evidence about `frames` frames, each of its own.
+  std::string write_evidence(int frames) {
+    const std::string file = path("evidence.db");
+    EvidenceWriter writer(file);
+    for (int frame = 0; frame < frames; ++frame) {
+      writer.add(frame, test::view(frame), evidence(frame));
+    }
+    writer.finish();
+    return file;
+  }
+
+  static Evidence evidence(int frame) {
+    test::Random random(frame);
+    cv::Mat1f saliency(64, 64, 0.0F);
+    saliency(frame % 64, 3) = 2.0F;
+    Evidence evidence{saliency, test::random_content(random, 0.3), {}};
+    for (int i = 0; i < frame; ++i) {
+      evidence.inliers.push_back({{0.25F, 0.5F}, {0.125F, static_cast<float>(i)}});
+    }
+    return evidence;
+  }
+};
+
+TEST_F(EvidenceFileTest, WhatWasWrittenIsRead) {
+  constexpr int kFrames = 70;
+  const EvidenceReader reader(write_evidence(kFrames));
+  StoredEvidence stored;
+  for (const int frame : {0, 1, 31, 32, 69}) {
+    ASSERT_TRUE(reader.read(frame, stored)) << frame;
+    EXPECT_EQ(stored.content, evidence(frame).content);
+    EXPECT_EQ(stored.inliers, evidence(frame).inliers);
+    const cv::Mat picture = cv::imdecode(stored.picture_jpeg, cv::IMREAD_UNCHANGED);
+    EXPECT_EQ(picture.size(), cv::Size(256, 192));
+    const cv::Mat1b saliency = cv::imdecode(stored.saliency_png, cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(saliency.size(), cv::Size(64, 64));
+    EXPECT_EQ(saliency(frame % 64, 3), 255);
+    EXPECT_EQ(cv::countNonZero(saliency), 1);
+  }
+  EXPECT_FALSE(reader.read(kFrames, stored));
+  int frames = 0;
+  reader.for_each_content([&](PlaceId frame, const BinaryContent& content) {
+    EXPECT_EQ(frame, frames++);
+    EXPECT_EQ(content, evidence(frame).content);
+  });
+  EXPECT_EQ(frames, kFrames);
+}
+
+TEST_F(EvidenceFileTest, TakesEveryKindOfImage) {
+  EvidenceWriter writer(path("evidence.db"));
+  int frame = 0;
+  for (const int type : {CV_8UC1, CV_8UC3, CV_8UC4, CV_16UC1, CV_16UC3, CV_16UC4}) {
+    writer.add(
+        frame++,
+        cv::Mat(100, 3000, type, cv::Scalar::all(CV_MAT_DEPTH(type) == CV_16U ? 25700 : 100)),
+        evidence(0));
+  }
+  writer.finish();
+  const EvidenceReader reader(path("evidence.db"));
+  StoredEvidence stored;
+  for (int i = 0; i < frame; ++i) {
+    ASSERT_TRUE(reader.read(i, stored));
+    const cv::Mat1b picture = cv::imdecode(stored.picture_jpeg, cv::IMREAD_GRAYSCALE);
+    EXPECT_EQ(picture.size(), cv::Size(256, 9)) << i;
+    EXPECT_NEAR(picture(4, 128), 100, 2) << i;
+  }
+}
+
+TEST_F(EvidenceFileTest, ACutOffFileIsReadOrRefused) {
+  const std::string file = write_evidence(5);
+  const auto size = fs::file_size(file);
+  for (std::uintmax_t bytes = size; bytes-- > 0; bytes -= std::min<std::uintmax_t>(bytes, 997)) {
+    fs::resize_file(file, bytes);
+    try {
+      const EvidenceReader reader(file);
+      reader.for_each_content([](PlaceId, const BinaryContent&) {});
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::input);
+      EXPECT_NE(std::string(error.what()).find(file), std::string::npos);
+    }
+  }
 }
 
 TEST(Summarize, LeavesUnreadableFramesOut) {
@@ -155,6 +339,47 @@ TEST(Run, TheSizeIsThatOfTheFirstUsableFrame) {
   EXPECT_EQ(told.detections[0].status, Status::unreadable);
   EXPECT_NE(told.detections[1].status, Status::unreadable);
   EXPECT_NE(told.detections[2].status, Status::unreadable);
+}
+
+TEST(Run, TellsWhatADetectionRestsOnAndChangesNothingByIt) {
+  auto list = frames(6);
+  list[2] = {"broken.png", 1.0, {}, "'broken.png' is empty."};
+  const auto again = [&](bool wants_evidence, std::vector<PlaceId>& told) {
+    FrameSource source(list);
+    LoopDetectorOptions options;
+    options.exclusion.frames = 1;
+    options.exclusion.min_frames = 1;
+    LoopDetector detector(options);
+    std::vector<Detection> detections;
+    RunListener listener{[&](const Detection& detection) { detections.push_back(detection); },
+                         [](const std::string&) {}};
+    if (wants_evidence) {
+      listener.on_evidence = [&](const Detection& d, const cv::Mat& image, const Evidence& seen) {
+        told.push_back(d.frame);
+        EXPECT_EQ(static_cast<int>(seen.inliers.size()), d.inliers);
+        EXPECT_EQ(seen.content, binary_content(image));
+        for (const PointPair& pair : seen.inliers) {
+          EXPECT_TRUE(cv::Rect2f(0, 0, 1, 1).contains(pair.query));
+          EXPECT_TRUE(cv::Rect2f(0, 0, 1, 1).contains(pair.match));
+        }
+      };
+    }
+    const std::atomic<bool> stop{false};
+    run(source, detector, listener, stop);
+    return detections;
+  };
+  for (std::size_t i = 3; i < list.size(); ++i) list[i].image = test::view(static_cast<int>(i) - 3);
+  std::vector<PlaceId> told;
+  const auto with = again(true, told);
+  const auto without = again(false, told);
+  EXPECT_EQ(told, (std::vector<PlaceId>{0, 1, 3, 4, 5}));
+  ASSERT_EQ(with.size(), without.size());
+  EXPECT_TRUE(std::any_of(with.begin(), with.end(), [](const auto& d) { return d.inliers > 8; }));
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    EXPECT_EQ(with[i].status, without[i].status);
+    EXPECT_EQ(with[i].match, without[i].match);
+    EXPECT_EQ(with[i].score, without[i].score);
+  }
 }
 
 TEST(Run, StopsWhenAsked) {

@@ -42,6 +42,13 @@ Status reason_of_rejection(const VerifiedCandidate& best, const VerificationOpti
   return best.inliers == 0 ? Status::no_geometry : Status::low_score;
 }
 
+/// Of a keypoint in its image, 0 to 1.
+cv::Point2f relative_position(const Features& features, int index) {
+  const Keypoint& keypoint = features.keypoints[static_cast<std::size_t>(index)];
+  return {keypoint.x_px / static_cast<float>(features.working_size_px.width),
+          keypoint.y_px / static_cast<float>(features.working_size_px.height)};
+}
+
 }  // namespace
 
 class LoopDetector::Impl {
@@ -54,6 +61,7 @@ class LoopDetector::Impl {
 
   /// One frame as the detector sees it: all that remember() needs.
   struct Observation {
+    cv::Mat1f saliency;
     BinaryContent content;
     Features features;
     RecentView::Look look;
@@ -69,7 +77,8 @@ class LoopDetector::Impl {
 
     // Step 1: what the image is recognised by.
     const cv::Mat1b gray = gray_image(image);
-    seen.content = binary_content(gray, options_.binary_content);
+    seen.saliency = saliency_map(gray, options_.binary_content);
+    seen.content = binarize(seen.saliency, options_.binary_content.gamma);
     detection.times.content_ms = stopwatch.lap_ms();
 
     // Step 3 begins: features. They also tell how far back the present view reaches.
@@ -90,6 +99,19 @@ class LoopDetector::Impl {
     decide(seen, end, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
     return detection;
+  }
+
+  [[nodiscard]] Evidence evidence(const Observation& seen, const Detection& detection) const {
+    Evidence evidence{seen.saliency, seen.content, {}};
+    if (detection.inliers == 0) return evidence;
+    const Features& place = features(*detection.match);
+    const Verification result = verify(seen.features, place, options_.verification);
+    evidence.inliers.reserve(result.inliers.size());
+    for (const Match& match : result.inliers) {
+      evidence.inliers.push_back(
+          {relative_position(seen.features, match.query), relative_position(place, match.place)});
+    }
+    return evidence;
   }
 
   void remember(Observation seen, std::optional<double> timestamp_s) {
@@ -227,9 +249,11 @@ LoopDetector::~LoopDetector() = default;
 LoopDetector::LoopDetector(LoopDetector&&) noexcept = default;
 LoopDetector& LoopDetector::operator=(LoopDetector&&) noexcept = default;
 
-Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s) {
+Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s,
+                                Evidence* evidence) {
   Impl::Observation seen;
   Detection detection = impl_->detect(image, timestamp_s, seen);
+  if (evidence) *evidence = impl_->evidence(seen, detection);
   impl_->remember(std::move(seen), timestamp_s);
   return detection;
 }

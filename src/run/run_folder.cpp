@@ -18,6 +18,9 @@
 #include "loopbit/error.hpp"
 #include "loopbit/kernels.hpp"
 #include "loopbit/version.hpp"
+#include "loopbit/write_file.hpp"
+
+#include "run_files.hpp"
 
 namespace loopbit {
 namespace {
@@ -25,14 +28,21 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kLoopsFile = "loops.csv";
-constexpr const char* kRecordFile = "run.json";
+/// All that a run may leave; a run that replaces another may not leave its files beside its own.
+std::vector<std::string> files_of_a_run() {
+  std::vector<std::string> names{kLoopsFile,  kRecordFile,    kTruthFile, kNotFalseFile,
+                                 kIgnoreFile, kPositionsFile, kReportFile};
+  for (const char* suffix : {"", "-wal", "-shm"}) {
+    names.push_back(std::string(kEvidenceFile) + suffix);
+  }
+  return names;
+}
 
 void make_folder(const fs::path& folder, bool overwrite) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw cannot_write(folder.string(), error.value());
-  for (const char* name : {kLoopsFile, kRecordFile}) {
+  for (const std::string& name : files_of_a_run()) {
     if (!fs::exists(folder / name)) continue;
     if (!overwrite) {
       throw Error(ErrorKind::output,
@@ -96,14 +106,8 @@ Json times(const std::vector<Detection>& detections) {
   return {{"content", to_json(summarize(detections, &StepTimes::content_ms))},
           {"retrieval", to_json(summarize(detections, &StepTimes::retrieval_ms))},
           {"features", to_json(summarize(detections, &StepTimes::features_ms))},
-          {"verification", to_json(summarize(detections, &StepTimes::verification_ms))}};
-}
-
-Json to_json(const DecisionCounts& score) {
-  return {{"positives", score.positives},  {"right", score.right},
-          {"tolerated", score.tolerated},  {"wrong", score.wrong},
-          {"ignored", score.ignored},      {"recall", score.recall()},
-          {"precision", score.precision()}};
+          {"verification", to_json(summarize(detections, &StepTimes::verification_ms))},
+          {"total", to_json(summarize(detections, total_ms))}};
 }
 
 Json to_json(const RunRecord& record, const std::vector<Detection>& detections) {
@@ -123,23 +127,8 @@ Json to_json(const RunRecord& record, const std::vector<Detection>& detections) 
             {"frames_per_s",
              record.wall_s > 0 ? static_cast<double>(detections.size()) / record.wall_s : 0.0},
             {"peak_memory_mib", peak_memory_mib()}};
-  if (record.score) json["score"] = to_json(*record.score);
+  if (record.score) json["score"] = Json::parse(to_json(*record.score, false));
   return json;
-}
-
-/// Under another name first, so that a full disk leaves no half-written file.
-void write_whole(const fs::path& path, const std::string& text) {
-  const fs::path part = path.string() + ".part";
-  std::ofstream file(part);
-  file << text;
-  file.close();
-  std::error_code error;
-  if (file) fs::rename(part, path, error);
-  if (!file || error) {
-    const int reason = error ? error.value() : errno;
-    fs::remove(part, error);
-    throw cannot_write(path.string(), reason);
-  }
 }
 
 }  // namespace
@@ -171,14 +160,44 @@ void RunFolder::add(const Detection& detection) {
   detections_.push_back(detection);
 }
 
-void RunFolder::finish(const RunRecord& record) {
-  write_whole(fs::path(path_) / kRecordFile, to_json(record, detections_).dump(2) + '\n');
+void RunFolder::write_truth(const GroundTruth& truth) {
+  const fs::path folder = path_;
+  write_place_runs((folder / kTruthFile).string(), "query, first and last true earlier frame",
+                   truth.same_place);
+  write_place_runs((folder / kNotFalseFile).string(),
+                   "query, first and last earlier frame: a match here is not false",
+                   truth.near_place);
+  std::string ignored = "# queries that are not scored\n";
+  for (const int frame : truth.ignored) ignored += fmt::format("{}\n", frame);
+  write_file((folder / kIgnoreFile).string(), ignored);
 }
 
-TimeSummary summarize(const std::vector<Detection>& detections, double StepTimes::*step) {
+void RunFolder::write_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m) {
+  std::string text = fmt::format("{}\n", kPositionsHeader);
+  for (std::size_t frame = 0; frame < positions_m.size(); ++frame) {
+    if (!positions_m[frame]) continue;
+    const cv::Vec3d& p = *positions_m[frame];
+    text += fmt::format("{},{:.4f},{:.4f},{:.4f}\n", frame, p[0], p[1], p[2]);
+  }
+  write_file((fs::path(path_) / kPositionsFile).string(), text);
+}
+
+std::string RunFolder::evidence_path() const { return (fs::path(path_) / kEvidenceFile).string(); }
+std::string RunFolder::report_path() const { return (fs::path(path_) / kReportFile).string(); }
+
+void RunFolder::finish(const RunRecord& record) {
+  write_file((fs::path(path_) / kRecordFile).string(), to_json(record, detections_).dump(2) + '\n');
+}
+
+double total_ms(const StepTimes& times) {
+  return times.content_ms + times.retrieval_ms + times.features_ms + times.verification_ms;
+}
+
+TimeSummary summarize(const std::vector<Detection>& detections,
+                      const std::function<double(const StepTimes&)>& time_ms) {
   std::vector<double> times;
   for (const Detection& detection : detections) {
-    if (detection.status != Status::unreadable) times.push_back(detection.times.*step);
+    if (detection.status != Status::unreadable) times.push_back(time_ms(detection.times));
   }
   if (times.empty()) return {};
   std::sort(times.begin(), times.end());

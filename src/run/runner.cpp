@@ -25,22 +25,26 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
   std::optional<cv::Size> size;
   const auto leave_out = [&](const Frame& frame, const std::string& reason) {
     listener.on_bad_frame(fmt::format("Frame {}: {}", detector.size(), reason));
-    return detector.skip(frame.timestamp_s);
+    listener.on_detection(detector.skip(frame.timestamp_s));
   };
   const auto detect = [&](const Frame& frame) {
     if (const std::string reason = fault(frame, size); !reason.empty()) {
       return leave_out(frame, reason);
     }
+    Evidence evidence;
+    Detection detection;
     try {
-      Detection detection = detector.process(frame.image, frame.timestamp_s);
-      size = frame.image.size();
-      return detection;
+      detection = detector.process(frame.image, frame.timestamp_s,
+                                   listener.on_evidence ? &evidence : nullptr);
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;
       return leave_out(frame, fmt::format("'{}': {}", frame.name, error.what()));
     }
+    size = frame.image.size();
+    listener.on_detection(detection);
+    if (listener.on_evidence) listener.on_evidence(detection, frame.image, evidence);
   };
-  for (Frame frame; !stop && source.next(frame);) listener.on_detection(detect(frame));
+  for (Frame frame; !stop && source.next(frame);) detect(frame);
 }
 
 }  // namespace loopbit

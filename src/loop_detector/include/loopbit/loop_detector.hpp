@@ -9,6 +9,7 @@
 #include <opencv2/core.hpp>
 
 #include "loopbit/detection.hpp"
+#include "loopbit/evidence.hpp"
 #include "loopbit/loop_detector_options.hpp"
 
 namespace loopbit {
@@ -36,8 +37,11 @@ class LoopDetector {
   ///
   /// `image`: 8- or 16-bit, grey, BGR or BGRA, at least 32 x 32. `timestamp_s`: in seconds, not
   /// before the last one; needed only where the exclusion window is given in seconds.
-  /// Throws Error (kind input), and stays as it was, if the image or the time cannot be used.
-  Detection process(const cv::Mat& image, std::optional<double> timestamp_s = std::nullopt);
+  /// `evidence`: if not null, is given what the answer rests on, at the cost of one more
+  /// verification. Throws Error (kind input), and stays as it was, if the image or the time cannot
+  /// be used.
+  Detection process(const cv::Mat& image, std::optional<double> timestamp_s = std::nullopt,
+                    Evidence* evidence = nullptr);
 
   /// What process() would answer now, without adding anything.
   [[nodiscard]] Detection query(const cv::Mat& image,

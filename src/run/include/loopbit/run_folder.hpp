@@ -4,13 +4,17 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include <opencv2/core.hpp>
+
 #include "loopbit/detection.hpp"
 #include "loopbit/evaluation.hpp"
+#include "loopbit/ground_truth.hpp"
 #include "loopbit/loop_detector_options.hpp"
 
 namespace loopbit {
@@ -25,7 +29,7 @@ struct RunRecord {
   int threads = 1;
   std::string stopped_by = "end";  ///< "end", "interrupt", or the sentence of an error
   double wall_s = 0;               ///< reading and detecting
-  std::optional<DecisionCounts> score = std::nullopt;
+  std::optional<Evaluation> score = std::nullopt;
 };
 
 /// A folder that a run leaves its evidence in: loops.csv, a row a frame, complete at any moment;
@@ -40,11 +44,20 @@ class RunFolder {
   /// output) if the disk is full; rows written before are kept.
   void add(const Detection& detection);
 
+  /// Writes what is true about the run, so that it can be scored and shown again without the
+  /// files it came from: truth.csv, not_false.csv, ignore.csv. Throws Error (kind output).
+  void write_truth(const GroundTruth& truth);
+
+  /// Writes positions.csv: camera centres, one a frame. Throws Error (kind output).
+  void write_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m);
+
   /// Writes run.json, all of it or nothing. Throws Error (kind output).
   void finish(const RunRecord& record);
 
   [[nodiscard]] const std::vector<Detection>& detections() const { return detections_; }
   [[nodiscard]] const std::string& path() const { return path_; }
+  [[nodiscard]] std::string evidence_path() const;
+  [[nodiscard]] std::string report_path() const;
 
  private:
   void append(const std::string& row);
@@ -59,7 +72,10 @@ class RunFolder {
   std::vector<Detection> detections_;
 };
 
-/// Mean and spread of one step's time over a run, in milliseconds.
+/// Time of all steps together.
+double total_ms(const StepTimes& times);
+
+/// Mean and spread of a time over a run, in milliseconds.
 struct TimeSummary {
   double mean = 0;
   double p50 = 0;
@@ -67,12 +83,17 @@ struct TimeSummary {
   double max = 0;
 };
 
-/// The summary of one step over the frames that were readable; zeros if there are none.
-TimeSummary summarize(const std::vector<Detection>& detections, double StepTimes::*step);
+/// The summary of a time, such as &StepTimes::content_ms or total_ms, over the frames that were
+/// readable; zeros if there are none.
+TimeSummary summarize(const std::vector<Detection>& detections,
+                      const std::function<double(const StepTimes&)>& time_ms);
 
 /// The header of loops.csv, without a line end.
 inline constexpr const char* kLoopsHeader =
     "frame,timestamp,status,match,score,similarity,matches,inliers,"
     "content_ms,retrieval_ms,features_ms,verification_ms";
+
+/// The header of positions.csv, without a line end.
+inline constexpr const char* kPositionsHeader = "frame,x_m,y_m,z_m";
 
 }  // namespace loopbit

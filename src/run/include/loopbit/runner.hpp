@@ -18,6 +18,8 @@ namespace loopbit {
 struct RunListener {
   std::function<void(const Detection&)> on_detection;    ///< for each frame, in order
   std::function<void(const std::string&)> on_bad_frame;  ///< one sentence; its row follows
+  /// Where wanted: for each frame that is readable, after on_detection.
+  std::function<void(const Detection&, const cv::Mat& image, const Evidence&)> on_evidence = {};
 };
 
 /// Reads `source` to its end, or until `stop` turns true, and detects frame by frame. A frame that

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <vector>
+
+#include <opencv2/core.hpp>
+
+#include "loopbit/binary_content.hpp"
+
+namespace loopbit {
+
+/// One point of the world as two images show it: x from 0 (left) to 1, y from 0 (top) to 1.
+struct PointPair {
+  cv::Point2f query;
+  cv::Point2f match;
+
+  bool operator==(const PointPair&) const = default;
+};
+
+/// What a detection rests on, for people to look at; see LoopDetector::process.
+struct Evidence {
+  cv::Mat1f saliency;  ///< 64 x 64
+  BinaryContent content;
+  std::vector<PointPair> inliers;  ///< of the frame and its match, accepted or not
+};
+
+}  // namespace loopbit

@@ -1,0 +1,178 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/evidence_file.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <span>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "loopbit/error.hpp"
+
+#include "database.hpp"
+
+namespace loopbit {
+namespace {
+
+using Bytes = std::vector<unsigned char>;
+
+static_assert(std::endian::native == std::endian::little, "the file's numbers are little-endian");
+static_assert(sizeof(PointPair) == 4 * sizeof(float));
+
+constexpr int kFramesPerTransaction = 32;
+constexpr int kJpegQuality = 75;
+constexpr int kFormatVersion = 1;
+
+/// 8 bits, one channel or three.
+cv::Mat displayable(const cv::Mat& image) {
+  cv::Mat eight_bit = image;
+  if (image.depth() == CV_16U) image.convertTo(eight_bit, CV_8U, 1.0 / 257.0);
+  if (eight_bit.channels() == 4) cv::cvtColor(eight_bit, eight_bit, cv::COLOR_BGRA2BGR);
+  return eight_bit;
+}
+
+Bytes picture_jpeg(const cv::Mat& image) {
+  const double scale =
+      std::min(1.0, static_cast<double>(kPictureSide_px) / std::max(image.cols, image.rows));
+  cv::Mat small;
+  const cv::Size size(std::max(1, static_cast<int>(std::lround(image.cols * scale))),
+                      std::max(1, static_cast<int>(std::lround(image.rows * scale))));
+  cv::resize(displayable(image), small, size, 0, 0, cv::INTER_AREA);
+  Bytes bytes;
+  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
+  return bytes;
+}
+
+Bytes saliency_png(const cv::Mat1f& saliency) {
+  double largest = 0;
+  cv::minMaxLoc(saliency, nullptr, &largest);
+  cv::Mat1b scaled;
+  saliency.convertTo(scaled, CV_8U, largest > 0 ? 255.0 / largest : 0.0);
+  Bytes bytes;
+  cv::imencode(".png", scaled, bytes);
+  return bytes;
+}
+
+template <typename T>
+std::span<const unsigned char> bytes_of(std::span<const T> values) {
+  return {reinterpret_cast<const unsigned char*>(values.data()), values.size_bytes()};
+}
+
+BinaryContent content_from(std::span<const unsigned char> bytes) {
+  BinaryContent content;
+  if (bytes.size() == sizeof content.rows) {
+    std::memcpy(content.rows.data(), bytes.data(), bytes.size());
+  }
+  return content;
+}
+
+std::vector<PointPair> inliers_from(std::span<const unsigned char> bytes) {
+  std::vector<PointPair> inliers(bytes.size() / sizeof(PointPair));
+  if (!inliers.empty()) {
+    std::memcpy(inliers.data(), bytes.data(), inliers.size() * sizeof(PointPair));
+  }
+  return inliers;
+}
+
+}  // namespace
+
+class EvidenceWriter::Impl {
+ public:
+  explicit Impl(const std::string& path) : database_(path, Database::Access::create) {
+    database_.execute(fmt::format(
+        "PRAGMA journal_mode = WAL; PRAGMA synchronous = OFF; PRAGMA user_version = {}; "
+        "CREATE TABLE frame (frame INTEGER PRIMARY KEY, picture BLOB, saliency BLOB, content BLOB, "
+        "inliers BLOB)",
+        kFormatVersion));
+    insert_ =
+        std::make_unique<Statement>(database_, "INSERT INTO frame VALUES (?1, ?2, ?3, ?4, ?5)");
+  }
+
+  void add(PlaceId frame, const cv::Mat& image, const Evidence& evidence) {
+    if (pending_ == 0) database_.execute("BEGIN");
+    const Bytes picture = picture_jpeg(image);
+    const Bytes saliency = saliency_png(evidence.saliency);
+    insert_->bind(1, frame);
+    insert_->bind(2, picture);
+    insert_->bind(3, saliency);
+    insert_->bind(4, bytes_of(std::span<const std::uint64_t>(evidence.content.rows)));
+    insert_->bind(5, bytes_of(std::span<const PointPair>(evidence.inliers)));
+    insert_->step();
+    insert_->reset();
+    if (++pending_ == kFramesPerTransaction) save();
+  }
+
+  /// Readers that may not write need a file without a log beside it.
+  void finish() {
+    save();
+    database_.execute("PRAGMA journal_mode = DELETE");
+  }
+
+ private:
+  void save() {
+    if (pending_ == 0) return;
+    pending_ = 0;
+    database_.execute("COMMIT");
+  }
+
+  Database database_;
+  std::unique_ptr<Statement> insert_;
+  int pending_ = 0;
+};
+
+EvidenceWriter::EvidenceWriter(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
+EvidenceWriter::~EvidenceWriter() = default;
+void EvidenceWriter::add(PlaceId frame, const cv::Mat& image, const Evidence& evidence) {
+  impl_->add(frame, image, evidence);
+}
+void EvidenceWriter::finish() { impl_->finish(); }
+
+class EvidenceReader::Impl {
+ public:
+  explicit Impl(const std::string& path)
+      : database_(path, Database::Access::read),
+        row_(database_, "SELECT picture, saliency, content, inliers FROM frame WHERE frame = ?1") {}
+
+  bool read(PlaceId frame, StoredEvidence& evidence) {
+    row_.reset();
+    row_.bind(1, frame);
+    if (!row_.step()) return false;
+    const auto picture = row_.bytes(0);
+    evidence.picture_jpeg.assign(picture.begin(), picture.end());
+    const auto saliency = row_.bytes(1);
+    evidence.saliency_png.assign(saliency.begin(), saliency.end());
+    evidence.content = content_from(row_.bytes(2));
+    evidence.inliers = inliers_from(row_.bytes(3));
+    return true;
+  }
+
+  void for_each_content(const std::function<void(PlaceId, const BinaryContent&)>& visit) const {
+    Statement rows(database_, "SELECT frame, content FROM frame ORDER BY frame");
+    while (rows.step()) visit(static_cast<PlaceId>(rows.integer(0)), content_from(rows.bytes(1)));
+  }
+
+ private:
+  Database database_;
+  Statement row_;
+};
+
+EvidenceReader::EvidenceReader(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
+EvidenceReader::~EvidenceReader() = default;
+EvidenceReader::EvidenceReader(EvidenceReader&&) noexcept = default;
+EvidenceReader& EvidenceReader::operator=(EvidenceReader&&) noexcept = default;
+
+bool EvidenceReader::read(PlaceId frame, StoredEvidence& evidence) const {
+  return impl_->read(frame, evidence);
+}
+
+void EvidenceReader::for_each_content(
+    const std::function<void(PlaceId, const BinaryContent&)>& visit) const {
+  impl_->for_each_content(visit);
+}
+
+}  // namespace loopbit

@@ -1,0 +1,191 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/finished_run.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/run_folder.hpp"
+
+#include "run_files.hpp"
+
+namespace loopbit {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string read_text(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string text{std::istreambuf_iterator<char>(file), {}};
+  if (file.bad() || !file.is_open()) {
+    throw Error(ErrorKind::input, fmt::format("'{}' cannot be read: check that it exists and its "
+                                              "permissions.",
+                                              path.string()));
+  }
+  return text;
+}
+
+/// The cells of one line of a file of ours, which has no quotes and no spaces.
+class Row {
+ public:
+  Row(const std::string& file, std::size_t line, std::string_view text) : file_(file), line_(line) {
+    while (true) {
+      const auto comma = text.find(',');
+      cells_.push_back(text.substr(0, comma));
+      if (comma == std::string_view::npos) break;
+      text.remove_prefix(comma + 1);
+    }
+  }
+
+  [[nodiscard]] std::string_view cell(std::size_t column) const { return cells_[column]; }
+
+  template <typename T>
+  [[nodiscard]] T number(std::size_t column) const {
+    const std::string_view text = cell(column);
+    T value{};
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    if (error != std::errc() || end != text.data() + text.size()) fail(column);
+    return value;
+  }
+
+  template <typename T>
+  [[nodiscard]] std::optional<T> number_if_any(std::size_t column) const {
+    return cell(column).empty() ? std::nullopt : std::optional(number<T>(column));
+  }
+
+  void check_columns(std::size_t columns) const {
+    if (cells_.size() == columns) return;
+    throw Error(ErrorKind::input,
+                fmt::format("'{}', line {}, has {} columns, not {}: it was not written by this "
+                            "version of loopbit, or changed; run again.",
+                            file_, line_, cells_.size(), columns));
+  }
+
+  [[noreturn]] void fail(std::size_t column) const {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}', line {}, column {}, reads '{}': it was changed after loopbit "
+                            "wrote it; run again.",
+                            file_, line_, column + 1, cell(column).substr(0, 40)));
+  }
+
+ private:
+  const std::string& file_;
+  std::size_t line_;
+  std::vector<std::string_view> cells_;
+};
+
+/// Calls `visit(Row)` with each whole line of `path` after its header.
+template <typename Visit>
+void for_each_row(const std::string& path, std::string_view header, const Visit& visit) {
+  const std::string text = read_text(path);
+  std::string_view rest = text;
+  for (std::size_t line = 1;; ++line) {
+    const auto end = rest.find('\n');
+    if (end == std::string_view::npos) break;
+    const std::string_view row = rest.substr(0, end);
+    rest.remove_prefix(end + 1);
+    if (line > 1) {
+      visit(Row(path, line, row));
+    } else if (row != header) {
+      throw Error(ErrorKind::input,
+                  fmt::format("'{}' does not begin with '{}': it was not written by this version "
+                              "of loopbit.",
+                              path, header));
+    }
+  }
+}
+
+Status status_from(const Row& row, std::size_t column) {
+  const auto* const found =
+      std::find_if(kAllStatuses.begin(), kAllStatuses.end(),
+                   [&](Status status) { return to_string(status) == row.cell(column); });
+  if (found == kAllStatuses.end()) row.fail(column);
+  return *found;
+}
+
+Detection detection_from(const Row& row) {
+  constexpr std::size_t kColumns = 12;
+  row.check_columns(kColumns);
+  return {.frame = row.number<PlaceId>(0),
+          .timestamp_s = row.number_if_any<double>(1),
+          .status = status_from(row, 2),
+          .match = row.number_if_any<PlaceId>(3),
+          .score = row.number<double>(4),
+          .similarity = row.number<double>(5),
+          .matches = row.number<int>(6),
+          .inliers = row.number<int>(7),
+          .times = {.content_ms = row.number<double>(8),
+                    .retrieval_ms = row.number<double>(9),
+                    .features_ms = row.number<double>(10),
+                    .verification_ms = row.number<double>(11)}};
+}
+
+std::vector<std::optional<cv::Vec3d>> read_positions(const std::string& path, std::size_t frames) {
+  std::vector<std::optional<cv::Vec3d>> positions(frames);
+  for_each_row(path, kPositionsHeader, [&](const Row& row) {
+    row.check_columns(4);
+    const auto frame = row.number<std::size_t>(0);
+    if (frame >= frames) return;  // of a run that was cut off
+    positions[frame] = {row.number<double>(1), row.number<double>(2), row.number<double>(3)};
+  });
+  return positions;
+}
+
+}  // namespace
+
+std::vector<Detection> read_detections(const std::string& path) {
+  std::vector<Detection> detections;
+  for_each_row(path, kLoopsHeader, [&](const Row& row) {
+    detections.push_back(detection_from(row));
+    if (detections.back().frame != static_cast<PlaceId>(detections.size()) - 1) row.fail(0);
+  });
+  return detections;
+}
+
+FinishedRun read_run(const std::string& path) {
+  const fs::path folder = path;
+  if (!fs::exists(folder / kLoopsFile)) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' holds no run: there is no {} in it; name a folder that 'loopbit "
+                            "run' or 'loopbit demo' wrote.",
+                            path, kLoopsFile));
+  }
+  FinishedRun run;
+  run.path = path;
+  run.detections = read_detections((folder / kLoopsFile).string());
+  if (fs::exists(folder / kRecordFile)) run.record_json = read_text(folder / kRecordFile);
+  if (fs::exists(folder / kTruthFile)) {
+    run.truth = GroundTruth{read_place_runs((folder / kTruthFile).string()),
+                            read_place_runs((folder / kNotFalseFile).string()),
+                            read_frame_list((folder / kIgnoreFile).string())};
+  }
+  if (fs::exists(folder / kPositionsFile)) {
+    run.positions_m = read_positions((folder / kPositionsFile).string(), run.detections.size());
+  }
+  if (fs::exists(folder / kEvidenceFile)) run.evidence_path = (folder / kEvidenceFile).string();
+  return run;
+}
+
+MatchList match_list(const std::vector<Detection>& detections) {
+  MatchList list;
+  list.times_s.reserve(detections.size());
+  for (const Detection& detection : detections) {
+    list.times_s.push_back(detection.timestamp_s);
+    if (!detection.match) continue;
+    list.matches.push_back({.query = detection.frame,
+                            .match = *detection.match,
+                            .score = detection.score,
+                            .is_loop = detection.status == Status::loop});
+  }
+  return list;
+}
+
+}  // namespace loopbit

@@ -1,0 +1,17 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+namespace loopbit {
+
+// The files of a run folder.
+inline constexpr const char* kLoopsFile = "loops.csv";
+inline constexpr const char* kRecordFile = "run.json";
+inline constexpr const char* kEvidenceFile = "evidence.db";
+inline constexpr const char* kTruthFile = "truth.csv";
+inline constexpr const char* kNotFalseFile = "not_false.csv";
+inline constexpr const char* kIgnoreFile = "ignore.csv";
+inline constexpr const char* kPositionsFile = "positions.csv";
+inline constexpr const char* kReportFile = "report.html";
+
+}  // namespace loopbit
