@@ -1,14 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""The loopbit command as a user meets it: what it writes, says and exits with.
+"""The loopbit command as a user meets it: what it writes, says and exits with."""
 
-    command_line_test.py LOOPBIT [--quick] [unittest arguments]
-
---quick drives in fewer, wider steps, which suits a slow build; what is found is not judged then.
-"""
-
-import csv
 import json
 import os
 import pathlib
@@ -18,83 +12,19 @@ import resource
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
 
-LOOPBIT = pathlib.Path(sys.argv.pop(1)).resolve()
-QUICK = "--quick" in sys.argv
-if QUICK:
-    sys.argv.remove("--quick")
+from loopbit_command import (FRAMES, LOOPBIT, QUICK, WORLD, CommandTest, decisions, loopbit, rows)
+
 HEADER = (
     "frame,timestamp,status,match,score,similarity,matches,inliers,"
     "content_ms,retrieval_ms,features_ms,verification_ms"
 )
-# A small town: two laps of a short circuit, in pictures that are quick to draw.
-FRAMES = 40 if QUICK else 150
-WORLD = ["--frames", FRAMES, "--world", "laps=2", "--world", f"spacing_m={225 / FRAMES}",
-         "--world", "width_px=320", "--world", "height_px=240"]
 
 
-def loopbit(*arguments, environment=None, **options):
-    return subprocess.run(
-        [LOOPBIT, *map(str, arguments)],
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        env={**os.environ, **(environment or {})},
-        **options,
-    )
-
-
-def rows(folder):
-    with open(folder / "loops.csv", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def decisions(folder):
-    """loops.csv without the times, which differ from run to run."""
-    return [{k: v for k, v in row.items() if not k.endswith("_ms")} for row in rows(folder)]
-
-
-class CommandLineTest(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="loopbit_cli_"))
-        cls.dataset = cls.shared / "dataset"
-        made = loopbit("demo", *WORLD, "--write-images", cls.dataset)
-        assert made.returncode == 0, made.stderr
-        cls.images = cls.dataset / "images"
-        cls.reference = cls.shared / "reference"
-        ran = loopbit("run", cls.images, "--out", cls.reference, "--truth",
-                      cls.dataset / "truth.csv", "--not-false", cls.dataset / "not_false.csv")
-        assert ran.returncode == 0, ran.stderr
-        cls.reference_output = ran.stdout
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.shared)
-
-    def setUp(self):
-        self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="case_", dir=self.shared))
-        self.out = self.scratch / "out"
-
-    def few_images(self, number=14):
-        """A folder with the first images of the world."""
-        folder = self.scratch / "few"
-        folder.mkdir()
-        for image in sorted(self.images.iterdir())[:number]:
-            shutil.copy(image, folder)
-        return folder
-
-    def assert_fails(self, result, code, *words):
-        self.assertEqual(result.returncode, code, result.stderr)
-        for word in words:
-            self.assertIn(str(word), result.stderr)
-        sentences = [line for line in result.stderr.splitlines() if line.startswith("loopbit: ")]
-        self.assertEqual(len(sentences), 1, result.stderr)
-
+class CommandLineTest(CommandTest):
     # What a run leaves.
 
     def test_loops_csv_has_the_documented_header_and_a_row_a_frame(self):

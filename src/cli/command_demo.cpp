@@ -21,12 +21,23 @@ struct DemoFlags {
   std::vector<std::string> world_settings;
   std::string images;
   WorldOptions world;
+  TruthFlags truth;
 };
 
 std::string describe(const World& world) {
   const WorldOptions& options = world.options();
   return fmt::format("built-in world, seed {}, {:.2f} laps of {:.0f} m", options.seed, options.laps,
                      world.circuit_m());
+}
+
+Positions positions(const World& world, std::size_t frames) {
+  Positions positions;
+  positions.reserve(frames);
+  for (int frame = 0; static_cast<std::size_t>(frame) < frames; ++frame) {
+    const Pose pose = world.pose(frame);
+    positions.emplace_back(cv::Vec3d(pose.x_m, pose.y_m, 0.0));
+  }
+  return positions;
 }
 
 void write_images(const World& world, const std::string& folder) {
@@ -50,6 +61,7 @@ int demo_command(const DemoFlags& flags) {
                                                  name));
     }
   }
+  flags.truth.check();
   const auto world = std::make_shared<const World>(options);
   if (!flags.images.empty()) {
     write_images(*world, flags.images);
@@ -58,7 +70,12 @@ int demo_command(const DemoFlags& flags) {
   Session session;
   session.source = make_world_source(world);
   session.input = "demo";
-  session.truth = GroundTruth{world->same_place(), world->near_place(), {}};
+  session.evaluation = flags.truth.evaluation();
+  session.truth = [&](const FrameTimes& times_s) {
+    const GroundTruth built_in{world->same_place(), world->near_place(), {}};
+    return flags.truth.read_truth(times_s, 1).value_or(built_in);
+  };
+  session.positions = [&](const FrameTimes& times_s) { return positions(*world, times_s.size()); };
   return run_session(std::move(session), flags.session);
 }
 
@@ -77,12 +94,13 @@ void add_demo(CLI::App& app, int& exit_code) {
   auto flags = std::make_shared<DemoFlags>();
   CLI::App* command =
       app.add_subcommand("demo", "Find the loops of a drive through the built-in world");
-  command->footer(list_world_settings());
+  command->footer(list_world_settings() + list_truth_settings());
   flags->session.out = "loopbit_demo";
-  CLI::Option* out =
-      command->add_option("--out", flags->session.out, "Folder for loops.csv and run.json")
-          ->type_name("DIR")
-          ->capture_default_str();
+  CLI::Option* out = command
+                         ->add_option("--out", flags->session.out,
+                                      "Folder for loops.csv, run.json and report.html")
+                         ->type_name("DIR")
+                         ->capture_default_str();
   flags->session.add_to(*command);
   command->add_option("--frames", flags->world.frames, "Frames in the whole drive")
       ->type_name("N")
@@ -98,6 +116,7 @@ void add_demo(CLI::App& app, int& exit_code) {
                    "Write the drive as a data set with its truth, and detect nothing")
       ->type_name("DIR")
       ->excludes(out);
+  flags->truth.add_to(*command);
   command->callback([flags, &exit_code] { exit_code = demo_command(*flags); });
 }
 

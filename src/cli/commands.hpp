@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <string>
+#include <utility>
+
 #include <CLI/CLI.hpp>
 
 namespace loopbit::cli {
@@ -20,6 +23,13 @@ enum ExitCode : int {
 /// loopbit::Error.
 void add_run(CLI::App& app, int& exit_code);
 void add_demo(CLI::App& app, int& exit_code);
+void add_eval(CLI::App& app);
+void add_compare(CLI::App& app);
+void add_report(CLI::App& app);
+void add_reproduce(CLI::App& app, int& exit_code);
 void add_options(CLI::App& app);
+
+/// "NAME=VALUE" in two. Throws Error (kind option) without a "=".
+std::pair<std::string, std::string> split_setting(const std::string& text);
 
 }  // namespace loopbit::cli

@@ -52,6 +52,10 @@ int run_command_line(int argc, char** argv) {
   int exit_code = cli::success;
   cli::add_run(app, exit_code);
   cli::add_demo(app, exit_code);
+  cli::add_eval(app);
+  cli::add_compare(app);
+  cli::add_report(app);
+  cli::add_reproduce(app, exit_code);
   cli::add_options(app);
   check_command(app, argc, argv);
   try {

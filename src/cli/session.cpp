@@ -14,11 +14,14 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/evaluation.hpp"
+#include "loopbit/evidence_file.hpp"
+#include "loopbit/finished_run.hpp"
 #include "loopbit/run_folder.hpp"
 #include "loopbit/runner.hpp"
 
 #include "commands.hpp"
 #include "progress.hpp"
+#include "run_list.hpp"
 #include "summary.hpp"
 
 namespace loopbit::cli {
@@ -57,14 +60,35 @@ void check_readable(const std::vector<Detection>& detections, const std::string&
   }
 }
 
-void drive(ImageSource& source, LoopDetector& detector, RunFolder& folder) {
+void drive(ImageSource& source, LoopDetector& detector, RunFolder& folder, bool keep_evidence) {
   Progress progress(source.size());
-  const RunListener listener{[&](const Detection& detection) {
-                               folder.add(detection);
-                               progress.advance(detection.status == Status::loop);
-                             },
-                             [&](const std::string& sentence) { progress.report(sentence); }};
+  RunListener listener{[&](const Detection& detection) {
+                         folder.add(detection);
+                         progress.advance(detection.status == Status::loop);
+                       },
+                       [&](const std::string& sentence) { progress.report(sentence); }};
+  std::optional<EvidenceWriter> evidence;
+  if (keep_evidence) {
+    evidence.emplace(folder.evidence_path());
+    listener.on_evidence = [&](const Detection& detection, const cv::Mat& image,
+                               const Evidence& seen) {
+      evidence->add(detection.frame, image, seen);
+    };
+  }
   run(source, detector, listener, stop_requested);
+  if (evidence) evidence->finish();
+}
+
+/// Scores the run in `folder` into `record`, and keeps what it was scored by.
+void score(const Session& session, RunFolder& folder, RunRecord& record) {
+  const MatchList list = match_list(folder.detections());
+  if (const auto positions = session.positions(list.times_s); !positions.empty()) {
+    folder.write_positions(positions);
+  }
+  const auto truth = session.truth(list.times_s);
+  if (!truth) return;
+  folder.write_truth(*truth);
+  record.score = evaluate(list, *truth, session.evaluation);
 }
 
 }  // namespace
@@ -80,6 +104,17 @@ void SessionFlags::add_to(CLI::App& command) {
   command.add_option("--threads", threads, "Threads; 0 = one a core. Changes no result")
       ->type_name("N")
       ->check(CLI::Range(0, 1024));
+  command.add_flag("--no-report", no_report, "Keep no pictures and write no report.html");
+  add_report_flag(command, report);
+}
+
+void add_report_flag(CLI::App& command, ReportOptions& options) {
+  command
+      .add_option("--pictures-mb", options.max_pictures_mb,
+                  "Pictures in the report take at most so many megabytes")
+      ->type_name("MB")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 2000.0));
 }
 
 LoopDetectorOptions SessionFlags::detector_options() const {
@@ -110,14 +145,18 @@ int run_session(Session session, const SessionFlags& flags) {
   const auto start = Clock::now();
   const auto finish = [&](const std::string& stopped_by) {
     record.stopped_by = stopped_by;
-    record.wall_s = std::chrono::duration<double>(Clock::now() - start).count();
-    if (session.truth) record.score = count_decisions(folder.detections(), *session.truth);
     folder.finish(record);
   };
+  const auto elapsed_s = [&] {
+    return std::chrono::duration<double>(Clock::now() - start).count();
+  };
   try {
-    drive(*session.source, detector, folder);
+    drive(*session.source, detector, folder, !flags.no_report);
+    record.wall_s = elapsed_s();
     if (!stop_requested) check_readable(folder.detections(), session.input);
+    score(session, folder, record);
   } catch (const Error& error) {
+    record.wall_s = elapsed_s();
     try {
       finish(error.what());
     } catch (const Error&) {  // the disk that failed the run fails its record, too
@@ -125,7 +164,8 @@ int run_session(Session session, const SessionFlags& flags) {
     throw;
   }
   finish(stop_requested ? "interrupt" : "end");
-  print_summary(record, folder);
+  if (!flags.no_report) write_report(folder.report_path(), {report_run(flags.out)}, flags.report);
+  print_summary(record, folder, !flags.no_report);
   return stop_requested ? interrupted : success;
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,9 +10,12 @@
 
 #include <CLI/CLI.hpp>
 
-#include "loopbit/ground_truth.hpp"
+#include "loopbit/evaluation.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector_options.hpp"
+#include "loopbit/report.hpp"
+
+#include "truth_flags.hpp"
 
 namespace loopbit::cli {
 
@@ -22,6 +26,8 @@ struct SessionFlags {
   std::string config;
   std::vector<std::string> settings;  ///< "section.field=value"
   int threads = 0;                    ///< 0 = one a core
+  bool no_report = false;
+  ReportOptions report;
 
   void add_to(CLI::App& command);
 
@@ -35,15 +41,18 @@ struct Session {
   std::string input;  ///< for run.json and the summary
   int every = 1;
   int limit = 0;
-  std::optional<GroundTruth> truth;
+  // Asked with the frames' times when the run is over.
+  std::function<std::optional<GroundTruth>(const FrameTimes&)> truth;
+  std::function<Positions(const FrameTimes&)> positions;
+  EvaluationOptions evaluation;
 };
+
+/// Adds the flag for ReportOptions to `command`.
+void add_report_flag(CLI::App& command, ReportOptions& options);
 
 /// Runs a detector over the session's images into the folder that `flags` names, with progress on
 /// stderr and a summary on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in order.
 /// Throws Error.
 int run_session(Session session, const SessionFlags& flags);
-
-/// "NAME=VALUE" in two. Throws Error (kind option) without a "=".
-std::pair<std::string, std::string> split_setting(const std::string& text);
 
 }  // namespace loopbit::cli

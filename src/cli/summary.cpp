@@ -48,16 +48,17 @@ void print_times(const RunRecord& record, const std::vector<Detection>& detectio
 
 }  // namespace
 
-void print_summary(const RunRecord& record, const RunFolder& folder) {
+void print_summary(const RunRecord& record, const RunFolder& folder, bool has_report) {
   const auto& detections = folder.detections();
   fmt::print("input      {} ({}), {} frames{}\n", record.input, record.description,
              detections.size(), record.stopped_by == "interrupt" ? ", then interrupted" : "");
   const auto loops = count(detections, Status::loop);
   fmt::print("loops      {} frame{} at a place seen before\n", loops, loops == 1 ? "" : "s");
   print_reasons(detections);
-  if (record.score) print_score(*record.score);
+  if (record.score) print_score(record.score->decision);
   print_times(record, detections);
   fmt::print("written    {0}/loops.csv, {0}/run.json\n", folder.path());
+  if (has_report) fmt::print("report     {}\n", folder.report_path());
 }
 
 }  // namespace loopbit::cli

@@ -7,6 +7,6 @@
 namespace loopbit::cli {
 
 /// Prints what a finished run comes to, for people, on stdout.
-void print_summary(const RunRecord& record, const RunFolder& folder);
+void print_summary(const RunRecord& record, const RunFolder& folder, bool has_report);
 
 }  // namespace loopbit::cli

@@ -1,0 +1,143 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "loopbit/error.hpp"
+#include "loopbit/evaluation.hpp"
+#include "loopbit/run_folder.hpp"
+
+#include "commands.hpp"
+#include "open_page.hpp"
+#include "run_list.hpp"
+#include "session.hpp"
+
+namespace loopbit::cli {
+namespace {
+
+struct CompareFlags {
+  std::vector<std::string> runs;
+  std::string out;
+  TruthFlags truth;
+  ReportOptions report;
+  bool json = false;
+  bool open = false;
+};
+
+struct Row {
+  std::string name;
+  Evaluation evaluation;
+  std::optional<TimeSummary> time;  ///< of all steps together; loopbit's runs only
+};
+
+/// The truth of the first run that has one is that of all: they are about the same images.
+std::vector<ReportRun> read_runs(const CompareFlags& flags) {
+  std::vector<ReportRun> runs;
+  runs.reserve(flags.runs.size());
+  for (const std::string& text : flags.runs) runs.push_back(report_run(text, flags.truth));
+  const auto judged = std::find_if(runs.begin(), runs.end(),
+                                   [](const ReportRun& run) { return run.truth.has_value(); });
+  if (judged == runs.end()) {
+    throw Error(ErrorKind::option, "None of the runs says what is true; add --truth FILE.");
+  }
+  for (ReportRun& run : runs) {
+    run.truth = judged->truth;
+    run.evaluation = judged->evaluation;
+    if (run.positions_m.empty()) run.positions_m = judged->positions_m;
+  }
+  return runs;
+}
+
+void check_same_input(const std::vector<ReportRun>& runs) {
+  const ReportRun* first = nullptr;
+  for (const ReportRun& run : runs) {
+    if (!run.run) continue;
+    if (first && first->list.times_s.size() != run.list.times_s.size()) {
+      throw Error(
+          ErrorKind::input,
+          fmt::format("'{}' has {} frames, but '{}' has {}; compare runs on the same "
+                      "images.",
+                      first->name, first->list.times_s.size(), run.name, run.list.times_s.size()));
+    }
+    if (!first) first = &run;
+  }
+}
+
+Row row_of(const ReportRun& run) {
+  Row row{run.name, evaluate(run.list, *run.truth, run.evaluation), std::nullopt};
+  if (run.run) row.time = summarize(run.run->detections, total_ms);
+  return row;
+}
+
+void print_table(const std::vector<Row>& rows) {
+  std::size_t width = 4;
+  for (const Row& row : rows) width = std::max(width, row.name.size());
+  fmt::print(
+      "{:<{}}  recall  precision  wrong  R@100%P  avg.prec.  pair recall   mean ms    p99 ms\n",
+      "run", width);
+  for (const Row& row : rows) {
+    const Evaluation& e = row.evaluation;
+    fmt::print("{:<{}}  {:6.4f}     {:6.4f}  {:5}   {:6.4f}     {:6.4f}       {:6.4f}", row.name,
+               width, e.decision.recall(), e.decision.precision(), e.decision.wrong,
+               e.recall_at_full_precision, e.average_precision, e.pairs.recall());
+    if (row.time) fmt::print("  {:8.2f}  {:8.2f}", row.time->mean, row.time->p99);
+    fmt::print("\n");
+  }
+}
+
+void print_json(const std::vector<Row>& rows) {
+  auto json = nlohmann::ordered_json::array();
+  for (const Row& row : rows) {
+    auto entry = nlohmann::ordered_json::parse(to_json(row.evaluation, false));
+    entry["name"] = row.name;
+    if (row.time) entry["time_ms"] = {{"mean", row.time->mean}, {"p99", row.time->p99}};
+    json.push_back(entry);
+  }
+  fmt::print("{}\n", json.dump(2));
+}
+
+void compare_command(const CompareFlags& flags) {
+  const std::vector<ReportRun> runs = read_runs(flags);
+  check_same_input(runs);
+  std::vector<Row> rows;
+  rows.reserve(runs.size());
+  for (const ReportRun& run : runs) rows.push_back(row_of(run));
+  if (!flags.out.empty()) write_report(flags.out, runs, flags.report);
+  if (flags.json) {
+    print_json(rows);
+  } else {
+    print_table(rows);
+    if (!flags.out.empty()) fmt::print("report     {}\n", flags.out);
+  }
+  if (flags.open) open_page(flags.out);
+}
+
+}  // namespace
+
+void add_compare(CLI::App& app) {
+  auto flags = std::make_shared<CompareFlags>();
+  CLI::App* command =
+      app.add_subcommand("compare", "Set runs or detectors on the same images side by side");
+  command
+      ->add_option("RUN", flags->runs,
+                   "Two or more, each a run folder or a CSV of query,match[,score], as PATH or "
+                   "NAME=PATH")
+      ->required()
+      ->expected(2, 64);
+  CLI::Option* out = command->add_option("--out", flags->out, "Write one page that shows them all")
+                         ->type_name("FILE");
+  command->add_flag("--open", flags->open, "Show the page in the browser")->needs(out);
+  command->add_flag("--json", flags->json, "Print the table as JSON");
+  add_report_flag(*command, flags->report);
+  flags->truth.add_to(*command);
+  flags->truth.add_poses_to(*command);
+  command->footer(list_truth_settings());
+  command->callback([flags] { compare_command(*flags); });
+}
+
+}  // namespace loopbit::cli

@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "loopbit/evaluation.hpp"
+#include "loopbit/protocol.hpp"
+
+#include "commands.hpp"
+#include "run_list.hpp"
+
+namespace loopbit::cli {
+namespace {
+
+constexpr std::size_t kMaxListed = 20;
+
+struct EvalFlags {
+  std::string detections;
+  TruthFlags truth;
+  bool json = false;
+};
+
+const char* plural(std::int64_t n) { return n == 1 ? "" : "s"; }
+
+void print_decision(const DecisionCounts& counts) {
+  const Interval interval = wilson_interval(counts.right, counts.right + counts.wrong);
+  fmt::print("decided    {} of {} revisits found: recall {:.4f}\n", counts.right, counts.positives,
+             counts.recall());
+  fmt::print("           {} wrong loop{}: precision {:.4f} (95 % interval {:.4f} to {:.4f})\n",
+             counts.wrong, plural(counts.wrong), counts.precision(), interval.low, interval.high);
+  if (counts.tolerated + counts.ignored > 0) {
+    fmt::print("           {} loop{} tolerated, {} quer{} ignored\n", counts.tolerated,
+               plural(counts.tolerated), counts.ignored, counts.ignored == 1 ? "y" : "ies");
+  }
+}
+
+void print_pairs(const PairCounts& pairs) {
+  fmt::print("pairs      {} of {} true pairs found: recall {:.4f}; {} wrong: precision {:.4f}\n",
+             pairs.right, pairs.positives, pairs.recall(), pairs.wrong, pairs.precision());
+}
+
+void print_sweep(const Evaluation& evaluation) {
+  if (evaluation.score_at_full_precision) {
+    fmt::print("swept      recall {:.4f} at 100 % precision (score {:g} or more)\n",
+               evaluation.recall_at_full_precision, *evaluation.score_at_full_precision);
+  } else {
+    fmt::print("swept      recall 0 at 100 % precision: {}\n",
+               evaluation.curve.empty() ? "there are no matches" : "the highest score is wrong");
+  }
+  fmt::print("           average precision {:.4f}\n", evaluation.average_precision);
+}
+
+void print_wrong(const std::vector<ReportedMatch>& wrong) {
+  if (wrong.empty()) return;
+  fmt::print("wrong      query  match  score\n");
+  for (std::size_t i = 0; i < std::min(wrong.size(), kMaxListed); ++i) {
+    fmt::print("           {:>5}  {:>5}  {:g}\n", wrong[i].query, wrong[i].match, wrong[i].score);
+  }
+  if (wrong.size() > kMaxListed) {
+    fmt::print("           and {} more: --json lists all\n", wrong.size() - kMaxListed);
+  }
+}
+
+void eval_command(const EvalFlags& flags) {
+  const ReportRun run = scored_run(flags.detections, flags.truth);
+  const Evaluation evaluation = evaluate(run.list, *run.truth, run.evaluation);
+  if (flags.json) {
+    fmt::print("{}\n", to_json(evaluation, true));
+    return;
+  }
+  if (const std::string& protocol = run.evaluation.protocol; !protocol.empty()) {
+    fmt::print("protocol   {}: {}\n", protocol, find_protocol(protocol).help);
+  }
+  if (run.evaluation.tolerance_frames > 0) {
+    fmt::print("tolerance  {} frames\n", run.evaluation.tolerance_frames);
+  }
+  print_decision(evaluation.decision);
+  print_sweep(evaluation);
+  print_pairs(evaluation.pairs);
+  print_wrong(evaluation.wrong_loops);
+}
+
+}  // namespace
+
+void add_eval(CLI::App& app) {
+  auto flags = std::make_shared<EvalFlags>();
+  CLI::App* command =
+      app.add_subcommand("eval", "Score the matches of any detector against what is true");
+  command
+      ->add_option("DETECTIONS", flags->detections,
+                   "A run folder, or a CSV of query,match[,score] with or without a row of names")
+      ->required();
+  flags->truth.add_to(*command);
+  command->add_flag("--json", flags->json, "Print all numbers, wrong loops and the curve as JSON");
+  command->footer(list_truth_settings());
+  command->callback([flags] { eval_command(*flags); });
+}
+
+}  // namespace loopbit::cli

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+#include "commands.hpp"
+#include "open_page.hpp"
+#include "run_list.hpp"
+#include "session.hpp"
+
+namespace loopbit::cli {
+namespace {
+
+struct ReportFlags {
+  std::string run;
+  std::string out;
+  TruthFlags truth;
+  ReportOptions report;
+  bool open = false;
+};
+
+void report_command(const ReportFlags& flags) {
+  const ReportRun run = report_run(flags.run, flags.truth);
+  std::string path = flags.out;
+  if (path.empty()) {
+    if (!run.run) {
+      throw Error(
+          ErrorKind::option,
+          fmt::format("'{}' is no run folder to write report.html to; add --out FILE.", flags.run));
+    }
+    path = (std::filesystem::path(flags.run) / "report.html").string();
+  }
+  write_report(path, {run}, flags.report);
+  fmt::print("report     {} ({:.1f} MB)\n", path,
+             static_cast<double>(std::filesystem::file_size(path)) / 1e6);
+  if (flags.open) open_page(path);
+}
+
+}  // namespace
+
+void add_report(CLI::App& app) {
+  auto flags = std::make_shared<ReportFlags>();
+  CLI::App* command =
+      app.add_subcommand("report", "Write one HTML page that shows what a run found");
+  command
+      ->add_option("RUN", flags->run,
+                   "A run folder, or a CSV of query,match[,score] of another detector")
+      ->required();
+  command->add_option("--out", flags->out, "The page to write; default RUN/report.html")
+      ->type_name("FILE");
+  command->add_flag("--open", flags->open, "Show the page in the browser");
+  add_report_flag(*command, flags->report);
+  flags->truth.add_to(*command);
+  flags->truth.add_poses_to(*command);
+  command->footer(list_truth_settings());
+  command->callback([flags] { report_command(*flags); });
+}
+
+}  // namespace loopbit::cli

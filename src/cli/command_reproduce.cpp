@@ -1,0 +1,220 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/finished_run.hpp"
+#include "loopbit/image_source.hpp"
+#include "loopbit/run_folder.hpp"
+
+#include "commands.hpp"
+#include "run_list.hpp"
+#include "session.hpp"
+
+namespace loopbit::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A row of the tables of Wang et al. 2019: recall in percent at full precision, mean time in ms.
+struct PaperRow {
+  std::string_view name;    ///< in the table
+  std::string_view folder;  ///< below the data, letters and digits only
+  double recall_percent;
+  double mean_ms;
+  std::optional<double> fab_map_percent;
+  std::optional<double> dbow2_percent;
+};
+
+constexpr std::array kPaper{
+    PaperRow{"KITTI 00", "00", 54.9, 130, 32.2, 57.2},
+    PaperRow{"KITTI 02", "02", 47.7, 129, 23.4, 38.9},
+    PaperRow{"KITTI 05", "05", 62.5, 118, 35.3, 54.0},
+    PaperRow{"City Centre", "citycentre", 27.7, 86, std::nullopt, std::nullopt},
+    PaperRow{"New College", "newcollege", 20.9, 92, std::nullopt, std::nullopt},
+};
+
+/// Where a set's images are, and how to score them.
+struct PublicSet {
+  std::string images;
+  int every = 1;
+  TruthFlags truth;
+};
+
+struct ReproduceFlags {
+  SessionFlags session;
+  std::string data;
+};
+
+struct ReproducedRow {
+  const PaperRow* paper;
+  ReportRun run;
+};
+
+std::string letters_and_digits(const std::string& name) {
+  std::string kept;
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0) kept += static_cast<char>(std::tolower(byte));
+  }
+  return kept;
+}
+
+/// The entries of a folder, sorted by name; none if it is no folder.
+std::vector<fs::path> entries(const fs::path& folder) {
+  std::vector<fs::path> paths;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) paths.push_back(entry.path());
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
+/// KITTI odometry as it is unpacked: sequences/NN/image_0 and poses/NN.txt, also below `dataset`.
+std::optional<PublicSet> find_kitti(const fs::path& data, std::string_view sequence) {
+  for (const char* below : {".", "dataset", "kitti", "KITTI", "kitti/dataset", "KITTI/dataset"}) {
+    const fs::path root = (data / below).lexically_normal();
+    const fs::path images = root / "sequences" / sequence;
+    const fs::path poses = root / "poses" / (std::string(sequence) + ".txt");
+    if (!fs::is_directory(images) || !fs::is_regular_file(poses)) continue;
+    PublicSet set;
+    set.images = images.string();
+    set.truth.truth = poses.string();
+    set.truth.protocol = "kitti";
+    return set;
+  }
+  return std::nullopt;
+}
+
+std::optional<std::size_t> frames_in(const std::string& images) {
+  return open_source(images)->size();
+}
+
+/// A set of FAB-MAP's: a folder Images with left and right images in turn, and beside it a .mat
+/// file whose name says "truth".
+std::optional<PublicSet> find_fab_map_set(const fs::path& data, std::string_view name) {
+  for (const fs::path& folder : entries(data)) {
+    if (letters_and_digits(folder.filename().string()) != name) continue;
+    PublicSet set;
+    for (const fs::path& entry : entries(folder)) {
+      const std::string entry_name = letters_and_digits(entry.filename().string());
+      if (entry_name == "images" && fs::is_directory(entry)) set.images = entry.string();
+      const bool is_truth = entry_name.find("truth") != std::string::npos;
+      if (is_truth && entry.extension() == ".mat") set.truth.truth = entry.string();
+    }
+    if (set.images.empty() || set.truth.truth.empty()) continue;
+    // Later versions of these matrices tell of the left images only.
+    const std::size_t images = frames_in(set.images).value_or(0);
+    const auto truth = set.truth.read_truth({}, 1);
+    int rows = 0;
+    for (const PlaceRun& run : truth->same_place) rows = std::max(rows, run.query + 1);
+    if (static_cast<std::size_t>(rows) * 2 <= images) set.every = 2;
+    return set;
+  }
+  return std::nullopt;
+}
+
+std::optional<PublicSet> find_set(const fs::path& data, const PaperRow& row) {
+  return row.name.starts_with("KITTI") ? find_kitti(data, row.folder)
+                                       : find_fab_map_set(data, row.folder);
+}
+
+/// Runs one set into a folder of its own. Returns the exit code.
+int run_set(const PublicSet& set, const SessionFlags& flags) {
+  Session session;
+  set.truth.check();
+  session.source = subsample(open_source(set.images), static_cast<std::size_t>(set.every), 0);
+  session.input = set.images;
+  session.every = set.every;
+  session.evaluation = set.truth.evaluation();
+  // The matrix is in the numbers of the images that are read.
+  session.truth = [&](const FrameTimes& times_s) { return set.truth.read_truth(times_s, 1); };
+  session.positions = [&](const FrameTimes& times_s) {
+    return set.truth.read_positions(times_s, 1);
+  };
+  return run_session(std::move(session), flags);
+}
+
+std::string percent(std::optional<double> value) {
+  return value ? fmt::format("{:.1f}", *value) : "-";
+}
+
+void print_table(const std::vector<ReproducedRow>& rows) {
+  fmt::print(
+      "\nRecall in percent. loopbit: as decided, and swept to full precision, by query; pairs as "
+      "decided.\nPaper: Wang et al. 2019, full precision; its FAB-MAP and DBoW2 beside it. Times "
+      "on "
+      "different machines.\n\n"
+      "             ------------ loopbit ------------   ------- paper -------\n"
+      "set          decided  wrong  swept  pairs    ms   recall    ms  FAB-MAP  DBoW2\n");
+  for (const auto& [paper, run] : rows) {
+    const Evaluation e = evaluate(run.list, *run.truth, run.evaluation);
+    const double mean_ms = summarize(run.run->detections, total_ms).mean;
+    fmt::print("{:<12} {:7.1f}  {:5}  {:5.1f}  {:5.1f}  {:4.0f}   {:6.1f}  {:4.0f}  {:>7}  {:>5}\n",
+               paper->name, 100 * e.decision.recall(), e.decision.wrong,
+               100 * e.recall_at_full_precision, 100 * e.pairs.recall(), mean_ms,
+               paper->recall_percent, paper->mean_ms, percent(paper->fab_map_percent),
+               percent(paper->dbow2_percent));
+  }
+}
+
+int reproduce_command(const ReproduceFlags& flags) {
+  std::vector<ReproducedRow> rows;
+  std::string missing;
+  for (const PaperRow& paper : kPaper) {
+    const auto set = find_set(flags.data, paper);
+    if (!set) {
+      missing += fmt::format("\n  {}", paper.name);
+      continue;
+    }
+    SessionFlags session = flags.session;
+    session.out =
+        (fs::path(flags.session.out) / letters_and_digits(std::string(paper.name))).string();
+    fmt::print("\n{}\n", paper.name);
+    if (const int exit_code = run_set(*set, session); exit_code != success) return exit_code;
+    rows.push_back({&paper, report_run(session.out)});
+  }
+  if (rows.empty()) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' holds none of the paper's data sets; see 'loopbit reproduce "
+                            "--help' for where they are looked for.",
+                            flags.data));
+  }
+  print_table(rows);
+  if (!missing.empty()) fmt::print("\nNot found, and left out:{}\n", missing);
+  return success;
+}
+
+}  // namespace
+
+void add_reproduce(CLI::App& app, int& exit_code) {
+  auto flags = std::make_shared<ReproduceFlags>();
+  CLI::App* command =
+      app.add_subcommand("reproduce", "Run the tables of the paper on the public data sets");
+  command->add_option("DATA", flags->data, "The folder that holds the data sets")->required();
+  command->add_option("--out", flags->session.out, "Folder for the runs, one a data set")
+      ->type_name("DIR")
+      ->required();
+  flags->session.add_to(*command);
+  command->footer(
+      "Looked for in DATA, as they are published:\n"
+      "  KITTI odometry 00, 02, 05: sequences/00/image_0 and poses/00.txt, also below dataset,\n"
+      "    kitti or KITTI; scored by --protocol kitti\n"
+      "  City Centre, New College: a folder CityCentre or NewCollege with Images and a .mat file\n"
+      "    whose name says truth; scored by its cells\n"
+      "What is not there is named and left out.");
+  command->callback([flags, &exit_code] { exit_code = reproduce_command(*flags); });
+}
+
+}  // namespace loopbit::cli

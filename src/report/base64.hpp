@@ -1,0 +1,13 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+#include <string>
+
+namespace loopbit::report {
+
+/// RFC 4648, with padding.
+std::string base64(std::span<const unsigned char> bytes);
+
+}  // namespace loopbit::report

@@ -1,0 +1,271 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "loopbit/error.hpp"
+#include "loopbit/evidence_file.hpp"
+#include "loopbit/loop_detector_options.hpp"
+#include "loopbit/version.hpp"
+#include "loopbit/write_file.hpp"
+
+#include "base64.hpp"
+#include "pictures.hpp"
+#include "report_page.hpp"
+#include "similarity_matrix.hpp"
+
+namespace loopbit {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using report::FrameView;
+
+constexpr std::string_view kDataPlace = "@REPORT_DATA@";
+
+int frame_count(const MatchList& list) {
+  int frames = static_cast<int>(list.times_s.size());
+  if (frames > 0) return frames;
+  for (const ReportedMatch& match : list.matches) frames = std::max(frames, match.query + 1);
+  return frames;
+}
+
+/// Of each frame the match that speaks for it: accepted before rejected, then by score.
+std::vector<const ReportedMatch*> best_matches(const MatchList& list, int frames) {
+  std::vector<const ReportedMatch*> best(static_cast<std::size_t>(frames));
+  for (const ReportedMatch& match : list.matches) {
+    if (match.query >= frames) continue;
+    const ReportedMatch*& slot = best[static_cast<std::size_t>(match.query)];
+    if (!slot || std::pair(match.is_loop, match.score) > std::pair(slot->is_loop, slot->score)) {
+      slot = &match;
+    }
+  }
+  return best;
+}
+
+std::string verdict_of(int frame, const ReportedMatch* match, const Judge* judge) {
+  const bool is_loop = match && match->is_loop;
+  if (!judge) return is_loop ? "loop" : "none";
+  if (judge->is_ignored(frame)) return "ignored";
+  const auto judgement = is_loop ? std::optional(judge->judge(frame, match->match)) : std::nullopt;
+  if (judgement == Judgement::right) return "right";
+  if (judgement == Judgement::wrong) return "wrong";
+  if (judge->is_positive(frame)) return "missed";
+  return judgement == Judgement::tolerated ? "tolerated" : "none";
+}
+
+/// The true place that stands for all of a query's: the middle of its first run.
+std::optional<int> true_place(const GroundTruth& truth, int query) {
+  const auto run = std::find_if(truth.same_place.begin(), truth.same_place.end(),
+                                [&](const PlaceRun& r) { return r.query == query; });
+  if (run == truth.same_place.end()) return std::nullopt;
+  return run->first + (run->last - run->first) / 2;
+}
+
+std::vector<FrameView> frame_views(const ReportRun& run, int frames) {
+  const auto judge =
+      run.truth ? std::optional<Judge>(std::in_place, *run.truth, run.evaluation) : std::nullopt;
+  const auto best = best_matches(run.list, frames);
+  std::vector<FrameView> views;
+  views.reserve(best.size());
+  for (int frame = 0; frame < frames; ++frame) {
+    const ReportedMatch* match = best[static_cast<std::size_t>(frame)];
+    FrameView view{frame, verdict_of(frame, match, judge ? &*judge : nullptr), {}};
+    if (match) view.partners.push_back(match->match);
+    if (view.verdict == "missed" || view.verdict == "wrong") {
+      if (const auto place = true_place(*run.truth, frame)) view.partners.push_back(*place);
+    }
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+Json flat(const std::vector<PlaceRun>& runs) {
+  Json json = Json::array();
+  for (const PlaceRun& run : runs) {
+    for (const int number : {run.query, run.first, run.last}) json.push_back(number);
+  }
+  return json;
+}
+
+Json evaluation_json(const ReportRun& run) {
+  if (!run.truth) return nullptr;
+  return Json::parse(to_json(evaluate(run.list, *run.truth, run.evaluation), true));
+}
+
+template <typename Of>
+Json column(const std::vector<Detection>& detections, const Of& of) {
+  Json json = Json::array();
+  for (const Detection& detection : detections) json.push_back(of(detection));
+  return json;
+}
+
+/// The columns that loops.csv has and other detectors' lists have not.
+void add_own_columns(Json& json, const std::vector<Detection>& detections) {
+  const auto time = [&](double StepTimes::*step) {
+    return column(detections, [&](const Detection& d) { return d.times.*step; });
+  };
+  Json names = Json::array();
+  for (const Status status : kAllStatuses) names.push_back(to_string(status));
+  json["status_names"] = names;
+  json["status"] =
+      column(detections, [](const Detection& d) { return static_cast<int>(d.status); });
+  json["similarity"] = column(detections, [](const Detection& d) { return d.similarity; });
+  json["matches"] = column(detections, [](const Detection& d) { return d.matches; });
+  json["inliers"] = column(detections, [](const Detection& d) { return d.inliers; });
+  json["times_ms"] = {{"content", time(&StepTimes::content_ms)},
+                      {"retrieval", time(&StepTimes::retrieval_ms)},
+                      {"features", time(&StepTimes::features_ms)},
+                      {"verification", time(&StepTimes::verification_ms)}};
+}
+
+void add_match_columns(Json& json, const MatchList& list, int frames) {
+  json["timestamp_s"] = nullptr;
+  const auto has_time = [](const auto& time) { return time.has_value(); };
+  if (std::any_of(list.times_s.begin(), list.times_s.end(), has_time)) {
+    json["timestamp_s"] = Json::array();
+    for (const auto& time : list.times_s) {
+      json["timestamp_s"].push_back(time ? Json(*time) : Json());
+    }
+  }
+  json["status_names"] = {"loop", "no_loop"};
+  for (const char* name : {"status", "match", "score"}) json[name] = Json::array();
+  for (const ReportedMatch* match : best_matches(list, frames)) {
+    json["status"].push_back(match && match->is_loop ? 0 : 1);
+    json["match"].push_back(match ? match->match : -1);
+    json["score"].push_back(match ? match->score : 0.0);
+  }
+  for (const char* name : {"similarity", "matches", "inliers", "times_ms"}) json[name] = nullptr;
+}
+
+/// The two axes of the world along which the drive reaches furthest: the plane of the drive.
+std::array<int, 2> plane(const std::vector<std::optional<cv::Vec3d>>& positions_m) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  std::array<double, 3> low{kInfinity, kInfinity, kInfinity};
+  std::array<double, 3> high{-kInfinity, -kInfinity, -kInfinity};
+  for (const auto& position : positions_m) {
+    if (!position) continue;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], (*position)[static_cast<int>(axis)]);
+      high[axis] = std::max(high[axis], (*position)[static_cast<int>(axis)]);
+    }
+  }
+  std::size_t flattest = 0;
+  for (std::size_t axis = 1; axis < 3; ++axis) {
+    if (high[axis] - low[axis] < high[flattest] - low[flattest]) flattest = axis;
+  }
+  return {flattest == 0 ? 1 : 0, flattest == 2 ? 1 : 2};
+}
+
+Json positions(std::vector<std::optional<cv::Vec3d>> positions_m, int frames) {
+  positions_m.resize(static_cast<std::size_t>(frames));
+  const auto has_position = [](const auto& position) { return position.has_value(); };
+  if (std::none_of(positions_m.begin(), positions_m.end(), has_position)) return nullptr;
+  const auto [across, along] = plane(positions_m);
+  Json x = Json::array();
+  Json y = Json::array();
+  for (const auto& position : positions_m) {
+    x.push_back(position ? Json((*position)[across]) : Json());
+    y.push_back(position ? Json((*position)[along]) : Json());
+  }
+  return {{"x_m", x}, {"y_m", y}};
+}
+
+Json matrix_json(const EvidenceReader& evidence, int frames, int shift_tolerance_columns) {
+  std::vector<BinaryContent> contents(static_cast<std::size_t>(frames));
+  evidence.for_each_content([&](PlaceId frame, const BinaryContent& content) {
+    if (frame >= 0 && frame < frames) contents[static_cast<std::size_t>(frame)] = content;
+  });
+  const auto matrix = report::similarity_matrix(contents, shift_tolerance_columns);
+  if (matrix.cells.empty()) return nullptr;
+  std::vector<unsigned char> png;
+  cv::imencode(".png", matrix.cells, png);
+  return {{"side", matrix.cells.rows},
+          {"frames_per_cell", matrix.frames_per_cell},
+          {"png", report::base64(png)}};
+}
+
+/// The record, or null where the run was cut off.
+Json record_of(const ReportRun& run) {
+  if (!run.run || run.run->record_json.empty()) return nullptr;
+  const Json record = Json::parse(run.run->record_json, nullptr, false);
+  if (!record.is_object() || !record.contains("options")) {
+    throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is no record of a run: it was "
+                                              "changed after loopbit wrote it; run again.",
+                                              run.run->path));
+  }
+  return record;
+}
+
+Json run_json(const ReportRun& run, std::size_t max_picture_bytes) {
+  const int frames = frame_count(run.list);
+  const Json record = record_of(run);
+  const std::vector<FrameView> views = frame_views(run, frames);
+  Json json{{"name", run.name}, {"record", record}, {"threshold", nullptr}, {"frames", frames}};
+  add_match_columns(json, run.list, frames);
+  json["verdict"] = Json::array();
+  for (const FrameView& view : views) json["verdict"].push_back(view.verdict);
+  json["truth"] = nullptr;
+  if (run.truth) {
+    json["truth"] = {{"same_place", flat(run.truth->same_place)},
+                     {"near_place", flat(run.truth->near_place)}};
+  }
+  json["evaluation"] = evaluation_json(run);
+  json["positions"] = positions(run.positions_m, frames);
+  json["similarity_matrix"] = nullptr;
+  json["pictures"] = Json::object();
+  if (!run.run) return json;
+
+  LoopDetectorOptions options;
+  if (!record.is_null()) {
+    options = options_from_json(record["options"].dump(), run.run->path + "/run.json");
+    json["threshold"] = options.decision.min_score;
+  }
+  add_own_columns(json, run.run->detections);
+  if (!run.run->evidence_path.empty()) {
+    const EvidenceReader evidence(run.run->evidence_path);
+    json["similarity_matrix"] =
+        matrix_json(evidence, frames, options.retrieval.shift_tolerance_columns);
+    json["pictures"] = report::pictures(views, evidence, max_picture_bytes);
+  }
+  return json;
+}
+
+void replace_all(std::string& text, std::string_view from, std::string_view to) {
+  for (std::size_t at = text.find(from); at != std::string::npos;
+       at = text.find(from, at + to.size())) {
+    text.replace(at, from.size(), to);
+  }
+}
+
+}  // namespace
+
+std::string report_json(const std::vector<ReportRun>& runs, const ReportOptions& options) {
+  constexpr double kBytesPerMb = 1e6;
+  const double max_bytes = options.max_pictures_mb * kBytesPerMb /
+                           static_cast<double>(std::max<std::size_t>(1, runs.size()));
+  Json json{{"loopbit", kVersion}, {"runs", Json::array()}};
+  for (const ReportRun& run : runs) {
+    json["runs"].push_back(run_json(run, static_cast<std::size_t>(max_bytes)));
+  }
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+void write_report(const std::string& path, const std::vector<ReportRun>& runs,
+                  const ReportOptions& options) {
+  std::string json = report_json(runs, options);
+  // Nothing in the data may end the element that holds it.
+  replace_all(json, "<", "\\u003c");
+  std::string page(report::kPage);
+  page.replace(page.find(kDataPlace), kDataPlace.size(), json);
+  write_file(path, page);
+}
+
+}  // namespace loopbit

@@ -1,0 +1,139 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+import { button, html } from "./dom.ts";
+import * as format from "./format.ts";
+import type { RunRecord } from "./report_data.ts";
+import type { RunModel } from "./run_model.ts";
+import type { Selection } from "./store.ts";
+import type { View } from "./view.ts";
+
+type Options = RunRecord["options"];
+
+/** As one would type it: quoted where the shell would split or change it. */
+const quoted = (text: string) =>
+  /^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
+
+/** "part.name", value pairs of all settings. */
+function flat(options: Options): [string, string][] {
+  return Object.entries(options).flatMap(([part, settings]) =>
+    Object.entries(settings).map(([name, value]): [string, string] => [
+      `${part}.${name}`,
+      String(value),
+    ]),
+  );
+}
+
+/** Those that are not as in `defaults`. */
+function changed(options: Options, defaults: Options): [string, string][] {
+  const usual = new Map(flat(defaults));
+  return flat(options).filter(([name, value]) => usual.get(name) !== value);
+}
+
+function commandOf(record: RunRecord, defaults: Options | undefined): string {
+  const { path, every, limit } = record.input;
+  const words = ["loopbit", "run", quoted(path), "--out", "again"];
+  if (every > 1) words.push("--every", String(every));
+  if (limit > 0) words.push("--limit", String(limit));
+  if (!defaults) return [...words, "--config", "options.json"].join(" ");
+  for (const [name, value] of changed(record.options, defaults))
+    words.push("--set", `${name}=${value}`);
+  return words.join(" ");
+}
+
+/** How the run came about, and how to repeat it. */
+export class Footer implements View {
+  readonly element: HTMLElement;
+  private readonly details = html("div", { class: "origin-details" });
+
+  constructor(
+    private readonly version: string,
+    private readonly defaults: Options | undefined,
+  ) {
+    this.element = html(
+      "footer",
+      {},
+      html("h2", {}, "How this came about"),
+      this.details,
+      html(
+        "p",
+        { class: "small" },
+        `Written by loopbit ${this.version}. This page is complete in itself: it loads nothing and sends nothing.`,
+      ),
+    );
+  }
+
+  showRun(model: RunModel): void {
+    const { record } = model.run;
+    if (!record) {
+      this.details.replaceChildren(
+        html(
+          "p",
+          {},
+          "There is no record of this run: neither its options nor its machine is known.",
+        ),
+      );
+      return;
+    }
+    this.details.replaceChildren(
+      html("h3", {}, "To run it again"),
+      command(commandOf(record, this.defaults)),
+      this.defaults
+        ? html("p", { class: "small" }, differing(record.options, this.defaults))
+        : html(
+            "p",
+            { class: "small" },
+            "options.json: the settings below, as run.json has them under options.",
+          ),
+      html("h3", {}, "Machine"),
+      machine(record),
+      settings(record.options, this.defaults),
+    );
+  }
+
+  showSelection(_: Selection): void {}
+}
+
+function differing(options: Options, defaults: Options): string {
+  const list = changed(options, defaults).map(([name, value]) => `${name} = ${value}`);
+  return list.length === 0
+    ? "All settings are the defaults."
+    : `Settings that are not the defaults: ${list.join(", ")}.`;
+}
+
+function command(text: string): HTMLElement {
+  const copy = button({ class: "quiet" }, () => void navigator.clipboard?.writeText(text), "copy");
+  return html("div", { class: "command" }, html("code", {}, text), copy);
+}
+
+function machine({ machine, threads, wall_s, peak_memory_mib }: RunRecord): HTMLElement {
+  const facts = [
+    machine.processor,
+    format.counted(machine.cores, "core"),
+    `${machine.kernel} kernels`,
+    machine.system,
+    format.counted(threads, "thread"),
+    `${wall_s.toFixed(1)} s in all`,
+    `${peak_memory_mib.toFixed(0)} MiB at most`,
+  ];
+  return html("p", {}, facts.join(", "));
+}
+
+function settings(options: Options, defaults: Options | undefined): HTMLElement {
+  const unusual = new Set(defaults ? changed(options, defaults).map(([name]) => name) : []);
+  const rows = flat(options).map(([name, value]) =>
+    html(
+      "tr",
+      { class: unusual.has(name) ? "changed" : null },
+      html("th", { scope: "row" }, name),
+      html("td", { "data-key": `options.${name}` }, value),
+    ),
+  );
+  const table = html(
+    "table",
+    { class: "numbers settings" },
+    html("caption", {}, "All settings in force; 'loopbit options' explains each"),
+    html("tbody", {}, ...rows),
+  );
+  return html("details", {}, html("summary", {}, `All ${rows.length} settings`), table);
+}

@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+const kMissing = "–";
+const kGrouped = new Intl.NumberFormat("en-GB");
+
+export const count = (value: number): string => kGrouped.format(value);
+
+/** "no loop", "1 loop", "2 loops". */
+export const counted = (value: number, one: string, many = `${one}s`): string =>
+  `${value === 0 ? "no" : count(value)} ${value <= 1 ? one : many}`;
+
+export const share = (value: number): string => value.toFixed(3);
+
+export function similarity(value: number | null): string {
+  return value === null ? kMissing : value.toFixed(3);
+}
+
+/** Scores are sums of halves as a rule, but another detector's may be anything. */
+export function score(value: number): string {
+  if (Number.isInteger(value)) return count(value);
+  const digits = Math.abs(value) >= 100 ? 1 : Math.abs(value) >= 1 ? 2 : 4;
+  return value.toFixed(digits).replace(/\.?0+$/, "");
+}
+
+/** Three significant digits or so; steps take from microseconds to seconds. */
+export function milliseconds(value: number): string {
+  if (value >= 100) return count(Math.round(value));
+  if (value >= 10) return value.toFixed(1);
+  return value >= 1 ? value.toFixed(2) : value.toFixed(3);
+}
+
+export const rate = (value: number): string => (value >= 100 ? value.toFixed(0) : value.toFixed(1));
+
+export const timestamp = (seconds: number): string => `${seconds.toFixed(2)} s`;

@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+import { button, html } from "./dom.ts";
+import type { Store } from "./store.ts";
+
+const kKeys: readonly (readonly [string, string])[] = [
+  ["← →", "the frame before, the frame after, among those that the filter lets through"],
+  ["Home End", "the first, the last of them"],
+  ["Tab", "to the next control or plot"],
+  ["+ − 0", "zoom in, zoom out, show all, in the plot that has the focus"],
+  ["wheel, drag", "zoom and move a plot that was clicked; Ctrl + wheel zooms any"],
+  ["?", "this list"],
+  ["Esc", "close it"],
+];
+
+/** The list of keys, and the button that opens it. */
+export function keyHelp(): { dialog: HTMLDialogElement; opener: HTMLButtonElement } {
+  const rows = kKeys.map(([keys, what]) =>
+    html("tr", {}, html("th", { scope: "row" }, html("kbd", {}, keys)), html("td", {}, what)),
+  );
+  const dialog = html(
+    "dialog",
+    { id: "keys", "aria-labelledby": "keys-title" },
+    html("h2", { id: "keys-title" }, "Keys"),
+    html("table", {}, html("tbody", {}, ...rows)),
+    button({}, () => dialog.close(), "Close"),
+  );
+  const opener = button({ title: "Keys (?)" }, () => dialog.showModal(), "keys");
+  return { dialog, opener };
+}
+
+const takesKeys = (target: EventTarget | null) =>
+  target instanceof HTMLInputElement || target instanceof HTMLTextAreaElement;
+
+/** Arrow keys walk from anywhere but a field of text. */
+export function listenToKeys(store: Store, dialog: HTMLDialogElement): void {
+  const acts: Record<string, () => void> = {
+    ArrowLeft: () => store.walk(-1),
+    ArrowRight: () => store.walk(1),
+    Home: () => store.walkToEnd("first"),
+    End: () => store.walkToEnd("last"),
+    "?": () => dialog.showModal(),
+  };
+  addEventListener("keydown", (event) => {
+    const act = acts[event.key];
+    const isOurs = !event.ctrlKey && !event.metaKey && !event.altKey && !dialog.open;
+    if (!act || !isOurs || takesKeys(event.target)) return;
+    event.preventDefault();
+    act();
+  });
+}

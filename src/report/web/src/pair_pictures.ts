@@ -1,0 +1,125 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+import { bytesOf } from "./content.ts";
+import { html, svg } from "./dom.ts";
+import type { RunModel } from "./run_model.ts";
+import { isMarked } from "./verdicts.ts";
+
+/** Between the two pictures, as a share of the width of one. */
+const kGap = 0.02;
+/** Wider pictures stand one above the other. */
+const kWide = 1.9;
+const kManyLines = 60;
+
+/** Query and match side by side, and the inlier matches as lines from one to the other. */
+export class PairPictures {
+  readonly element = html("div", { class: "pictures", role: "img" });
+  private shown = 0;
+
+  async show(model: RunModel, frame: number, partner: number | null, withLines: boolean) {
+    const turn = ++this.shown;
+    const [query, match] = await Promise.all([load(model, frame), load(model, partner)]);
+    if (turn !== this.shown) return;
+    const aspect = aspectOf(query) ?? aspectOf(match) ?? 0.75;
+    const isStacked = 1 / aspect > kWide;
+    this.element.classList.toggle("stacked", isStacked);
+    const inliers = withLines ? inliersOf(model, frame) : new Float32Array();
+    const partnerName = partner === null ? "no candidate" : `frame ${partner}`;
+    this.element.setAttribute(
+      "aria-label",
+      `Frame ${frame} and ${partnerName}, ${inliers.length / 4} inlier matches drawn.`,
+    );
+    this.element.replaceChildren(
+      framed(query, aspect, model, frame, `query ${frame}`),
+      framed(match, aspect, model, partner, partner === null ? "no candidate" : `match ${partner}`),
+    );
+    if (query && match && inliers.length > 0) {
+      const verdict = model.verdict(frame);
+      const mark = isMarked(verdict) ? verdict : "none";
+      this.element.append(linesOf(inliers, aspect, isStacked, mark));
+    }
+  }
+}
+
+async function load(model: RunModel, frame: number | null): Promise<HTMLImageElement | null> {
+  const picture = frame === null ? undefined : model.run.pictures[frame];
+  if (!picture) return null;
+  const image = html("img", { alt: "" });
+  image.src = `data:image/jpeg;base64,${picture.jpeg}`;
+  try {
+    await image.decode();
+  } catch {
+    return null;
+  }
+  return image;
+}
+
+const aspectOf = (image: HTMLImageElement | null) =>
+  image && image.naturalWidth > 0 ? image.naturalHeight / image.naturalWidth : null;
+
+/** x, y in the query and x, y in the match, each from 0 to 1. */
+function inliersOf(model: RunModel, frame: number): Float32Array {
+  const text = model.run.pictures[frame]?.inliers;
+  if (!text) return new Float32Array();
+  const bytes = bytesOf(text);
+  const data = new DataView(bytes.buffer);
+  return Float32Array.from({ length: 4 * Math.floor(bytes.length / 16) }, (_, i) =>
+    data.getFloat32(4 * i, true),
+  );
+}
+
+function framed(
+  image: HTMLImageElement | null,
+  aspect: number,
+  model: RunModel,
+  frame: number | null,
+  tag: string,
+): HTMLElement {
+  const box = html("div", { class: "picture" });
+  box.style.aspectRatio = `${1 / aspect}`;
+  box.append(image ?? html("p", { class: "absent" }, reasonOf(model, frame)));
+  box.append(html("span", { class: "tag" }, tag));
+  return box;
+}
+
+/** Why there is no picture, and what brings it. */
+function reasonOf(model: RunModel, frame: number | null): string {
+  if (frame === null) return "No earlier frame came into question.";
+  if (!model.isReadable(frame)) return "This image could not be read.";
+  if (Object.keys(model.run.pictures).length === 0) {
+    return model.run.record
+      ? "No pictures were kept with this run, or --pictures-mb left no room for one."
+      : "There are no pictures: they come with runs of loopbit.";
+  }
+  return "Left out to keep the page small; --pictures-mb N makes room for more.";
+}
+
+function linesOf(
+  inliers: Float32Array,
+  aspect: number,
+  isStacked: boolean,
+  mark: string,
+): SVGSVGElement {
+  const size = isStacked ? [1, 2 * aspect + kGap] : [2 + kGap, aspect];
+  const [dx, dy] = isStacked ? [0, aspect + kGap] : [1 + kGap, 0];
+  const many = inliers.length / 4 > kManyLines;
+  const drawing = svg("svg", {
+    class: `inliers ${mark}${many ? " many" : ""}`,
+    viewBox: `0 0 ${size.join(" ")}`,
+    preserveAspectRatio: "none",
+    "aria-hidden": "true",
+  });
+  for (let i = 0; i + 3 < inliers.length; i += 4) {
+    const [x1, y1, x2, y2] = inliers.subarray(i, i + 4) as unknown as [
+      number,
+      number,
+      number,
+      number,
+    ];
+    const ends = { x1, y1: y1 * aspect, x2: x2 + dx, y2: y2 * aspect + dy };
+    drawing.append(svg("line", { ...ends, class: "under" }));
+    drawing.append(svg("line", ends));
+  }
+  return drawing;
+}

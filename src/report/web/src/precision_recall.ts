@@ -1,0 +1,168 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+import { html, svg } from "./dom.ts";
+import * as format from "./format.ts";
+import { type Hit, Plot } from "./plot.ts";
+import { nearest, type Projection } from "./projection.ts";
+import type { CurvePoint } from "./report_data.ts";
+import { dashOf, lineOf } from "./run_lines.ts";
+import type { RunModel } from "./run_model.ts";
+import type { Selection, Store } from "./store.ts";
+import type { Theme } from "./theme.ts";
+import type { Point } from "./verdicts.ts";
+import { caption, section, type View } from "./view.ts";
+
+const at = ({ recall, precision }: { recall: number; precision: number }): Point => ({
+  x: recall,
+  y: precision,
+});
+
+/** Precision against recall over all thresholds, all runs in one plot. */
+export class PrecisionRecall implements View {
+  readonly element: HTMLElement;
+  private readonly caption = caption();
+  private readonly key = html("ul", { class: "legend" });
+  private readonly plot: Plot;
+
+  constructor(
+    private readonly store: Store,
+    private readonly models: readonly RunModel[],
+  ) {
+    this.plot = new Plot({
+      label: "Precision and recall. One curve a run.",
+      xLabel: "recall",
+      yLabel: "precision",
+      height: (width) => Math.max(260, Math.min(width * 0.66, 420)),
+      zoom: "xy",
+      bounds: () => ({ x: [-0.02, 1.03], y: [-0.02, 1.05] }),
+      draw: (ctx, to, theme) => this.draw(ctx, to, theme),
+      hit: (pixel, to) => this.hitAt(pixel, to),
+      selected: (to) => this.selected(to),
+      select: (hit) => this.store.select(hit.frame),
+    });
+    this.element = section(
+      "precision-recall",
+      "Precision and recall",
+      this.caption,
+      this.plot.controls(),
+      this.key,
+      this.plot.element,
+    );
+  }
+
+  showRun(model: RunModel): void {
+    this.caption.textContent =
+      "Each point is what would be found, and how much of it true, if every frame with at least that score were a loop; the large dot is the detector as shipped, the bar the most it finds without a wrong loop.";
+    const { evaluation } = model.run;
+    const entries: HTMLElement[] = [];
+    this.models.forEach((other, i) => {
+      if (!other.run.evaluation || this.models.length < 2) return;
+      entries.push(html("li", {}, lineOf(i, other === model), other.run.name));
+    });
+    if (evaluation) {
+      const { recall, precision, recall_at_full_precision: full } = evaluation;
+      entries.push(
+        html(
+          "li",
+          {},
+          `as shipped: recall ${format.share(recall)}, precision ${format.share(precision)}`,
+        ),
+        html("li", {}, `recall at 100 % precision: ${format.share(full)}`),
+      );
+    }
+    this.key.replaceChildren(...entries);
+    this.plot.reset();
+  }
+
+  showSelection(_: Selection): void {
+    this.plot.mark();
+  }
+
+  private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+    this.models.forEach((model, i) => {
+      if (model !== this.store.model) this.drawCurve(ctx, to, theme, model, i, false);
+    });
+    const { run } = this.store.now;
+    this.drawCurve(ctx, to, theme, this.store.model, run, true);
+  }
+
+  private drawCurve(
+    ctx: CanvasRenderingContext2D,
+    to: Projection,
+    theme: Theme,
+    model: RunModel,
+    index: number,
+    isSelected: boolean,
+  ): void {
+    const { evaluation } = model.run;
+    if (!evaluation) return;
+    const path = new Path2D();
+    evaluation.curve.forEach((point, i) => {
+      if (i === 0) path.moveTo(to.x(0), to.y(point.precision));
+      path.lineTo(to.x(point.recall), to.y(point.precision));
+    });
+    const colour = isSelected ? theme.ink : theme.muted;
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = (isSelected ? 2 : 1.5) * to.ratio;
+    ctx.setLineDash(dashOf(index).map((length) => length * to.ratio));
+    ctx.stroke(path);
+    ctx.setLineDash([]);
+    const full = to.x(evaluation.recall_at_full_precision);
+    const bar = 7 * to.ratio;
+    ctx.strokeRect(full, to.y(1) - bar, 0, 2 * bar);
+    ctx.beginPath();
+    ctx.arc(
+      to.x(evaluation.recall),
+      to.y(evaluation.precision),
+      (isSelected ? 5.5 : 4) * to.ratio,
+      0,
+      7,
+    );
+    ctx.fillStyle = isSelected ? theme.right : theme.muted;
+    ctx.fill();
+    ctx.lineWidth = 1.5 * to.ratio;
+    ctx.strokeStyle = theme.paper;
+    ctx.stroke();
+  }
+
+  /** The frame whose score makes the point of the curve. */
+  private hitAt(pixel: Point, to: Projection): Hit | null {
+    const model = this.store.model;
+    const curve = model.run.evaluation?.curve ?? [];
+    const i = nearest(
+      to,
+      pixel,
+      curve.length,
+      (k) => atIndex(curve, k),
+      () => 0,
+      30,
+    );
+    const point = i === null ? undefined : curve[i];
+    if (!point) return null;
+    const frame = model.run.score.indexOf(point.score);
+    if (frame < 0) return null;
+    const text = [
+      `from score ${format.score(point.score)}`,
+      `${point.right} right, ${point.wrong} wrong`,
+      `recall ${format.share(point.recall)}, precision ${format.share(point.precision)}`,
+    ];
+    return { frame, at: at(point), text };
+  }
+
+  private selected(to: Projection): SVGElement[] {
+    const { frame } = this.store.now;
+    const score = this.store.model.score(frame);
+    const point = this.store.model.run.evaluation?.curve.find((other) => other.score === score);
+    if (!point) return [];
+    const { x, y } = at(point);
+    return [
+      svg("circle", { class: "selected", cx: to.x(x), cy: to.y(y), r: 9, "data-frame": frame }),
+    ];
+  }
+}
+
+function atIndex(curve: readonly CurvePoint[], i: number): Point | null {
+  const point = curve[i];
+  return point ? at(point) : null;
+}

@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+import type { Bounds } from "./bounds.ts";
+import { svg } from "./dom.ts";
+import * as format from "./format.ts";
+import { frameText } from "./frame_text.ts";
+import { Plot } from "./plot.ts";
+import { nearest, type Projection } from "./projection.ts";
+import type { RunModel } from "./run_model.ts";
+import type { Selection, Store } from "./store.ts";
+import type { Theme } from "./theme.ts";
+import { drawMarks, kMarked, markRadius, type Point } from "./verdicts.ts";
+import { caption, section, type View } from "./view.ts";
+
+/** The score of every frame, in order, with the threshold that makes a loop of it. */
+export class Score implements View {
+  readonly element: HTMLElement;
+  private readonly caption = caption();
+  private readonly plot: Plot;
+
+  constructor(private readonly store: Store) {
+    this.plot = new Plot({
+      label: "Score along the run. The score of each frame.",
+      xLabel: "frame",
+      yLabel: "score",
+      height: (width) => Math.max(220, Math.min(width * 0.34, 300)),
+      zoom: "x",
+      bounds: () => this.bounds(),
+      draw: (ctx, to, theme) => this.draw(ctx, to, theme),
+      hit: (pixel, to) => {
+        const frame = this.frameAt(pixel, to);
+        const model = this.store.model;
+        return frame === null
+          ? null
+          : { frame, at: this.place(frame), text: frameText(model, frame) };
+      },
+      selected: (to) => this.selected(to),
+      select: (hit) => this.store.select(hit.frame),
+    });
+    this.element = section(
+      "score",
+      "Score along the run",
+      this.caption,
+      this.plot.controls(),
+      this.plot.element,
+    );
+  }
+
+  showRun(model: RunModel): void {
+    const { threshold } = model.run;
+    this.caption.textContent =
+      threshold === null
+        ? "The score of each frame's best candidate, as the detector gave it; its threshold is not known."
+        : `The score of each frame's best candidate. From ${format.score(threshold)}, the dashed line, it is accepted.`;
+    this.plot.reset();
+  }
+
+  showSelection(_: Selection): void {
+    this.plot.mark();
+  }
+
+  private place(frame: number): Point {
+    return { x: frame, y: this.store.model.score(frame) };
+  }
+
+  private bounds(): Bounds {
+    const { run, frames } = this.store.model;
+    const scores = run.score.filter(Number.isFinite);
+    const top = scores.reduce((a, b) => Math.max(a, b), run.threshold ?? 0);
+    const low = scores.reduce((a, b) => Math.min(a, b), 0);
+    const air = (top - low || 1) * 0.07;
+    const side = Math.max(0.5, frames * 0.012);
+    return { x: [-side, frames - 1 + side], y: [low < 0 ? low - air : -0.4 * air, top + air] };
+  }
+
+  private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+    const model = this.store.model;
+    this.drawUnmarked(ctx, to, theme);
+    const count = model.framesIn("loops").length + model.framesIn("missed").length;
+    for (const verdict of kMarked) {
+      const points = model
+        .framesMarked(verdict)
+        .map((frame) => ({ x: to.x(frame), y: to.y(model.score(frame)) }));
+      drawMarks(ctx, verdict, points, (markRadius(count) - 0.5) * to.ratio, theme);
+    }
+    if (model.run.threshold !== null) this.drawThreshold(ctx, to, theme, model.run.threshold);
+  }
+
+  private drawUnmarked(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+    const model = this.store.model;
+    const size = (model.frames > 2000 ? 2 : 3) * to.ratio;
+    ctx.fillStyle = theme.faint;
+    for (let frame = 0; frame < model.frames; ++frame) {
+      if (model.hasMark(frame)) continue;
+      ctx.fillRect(to.x(frame) - size / 2, to.y(model.score(frame)) - size / 2, size, size);
+    }
+  }
+
+  private drawThreshold(
+    ctx: CanvasRenderingContext2D,
+    to: Projection,
+    theme: Theme,
+    threshold: number,
+  ): void {
+    const y = to.y(threshold);
+    ctx.strokeStyle = theme.ink;
+    ctx.lineWidth = 1.2 * to.ratio;
+    ctx.setLineDash([5 * to.ratio, 4 * to.ratio]);
+    ctx.beginPath();
+    ctx.moveTo(to.left, y);
+    ctx.lineTo(to.left + to.width, y);
+    ctx.stroke();
+    ctx.setLineDash([]);
+    ctx.font = `${12 * to.ratio}px ${theme.font}`;
+    ctx.textAlign = "left";
+    ctx.fillStyle = theme.ink;
+    ctx.strokeStyle = theme.paper;
+    ctx.lineWidth = 4 * to.ratio;
+    const text = `threshold ${format.score(threshold)}`;
+    const at: [number, number] = [to.left + 6 * to.ratio, y - 6 * to.ratio];
+    ctx.strokeText(text, ...at);
+    ctx.fillText(text, ...at);
+  }
+
+  /** The nearest mark, else the frame in the column under the pointer. */
+  private frameAt(pixel: Point, to: Projection): number | null {
+    const model = this.store.model;
+    const near = nearest(
+      to,
+      pixel,
+      model.frames,
+      (frame) => this.place(frame),
+      (frame) => (model.hasMark(frame) ? -4 : 0),
+    );
+    if (near !== null) return near;
+    const frame = Math.round(to.atX(pixel.x));
+    return frame >= 0 && frame < model.frames ? frame : null;
+  }
+
+  private selected(to: Projection): SVGElement[] {
+    const { frame } = this.store.now;
+    const x = to.x(frame);
+    const y = to.y(this.store.model.score(frame));
+    return [
+      svg("line", { class: "hair", x1: x, x2: x, y1: 0, y2: to.height }),
+      svg("circle", { class: "selected", cx: x, cy: y, r: 8, "data-frame": frame }),
+    ];
+  }
+}

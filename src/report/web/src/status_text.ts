@@ -1,0 +1,21 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+/** Why a frame has no loop, and what helps: the table of docs/run_folder.md in sentences. */
+const kMeanings: Record<string, string> = {
+  loop: "The match is accepted.",
+  no_loop: "The detector reports no loop here.",
+  no_earlier_place: "Every place so far is recent: this is the start of a drive.",
+  no_similar_place:
+    "No earlier place looks alike (ξ below retrieval.min_similarity); the picture may be blank or dark.",
+  few_matches:
+    "There are candidates, but none shares 8 features: a new place, or blur, or another direction of view.",
+  no_geometry:
+    "Features match, but not as one rigid scene: look-alike texture, or things that move.",
+  low_score:
+    "There is a geometry, but too little evidence: a new place, or an overlap too small to be sure.",
+  unreadable: "The image is damaged, of another size, or no image.",
+};
+
+export const meaningOfStatus = (status: string): string => kMeanings[status] ?? "";
+export const nameOfStatus = (status: string): string => status.replaceAll("_", " ");

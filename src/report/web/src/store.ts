@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+import { type Filter, kFilters, type RunModel } from "./run_model.ts";
+
+/** With what the frame is shown: its best candidate, its true place, or a frame by number. */
+export type Against = "match" | "truth" | number;
+
+export interface Selection {
+  run: number;
+  frame: number;
+  against: Against;
+  filter: Filter;
+}
+
+type Listener = (now: Selection, before: Selection) => void;
+
+/** What is selected: the one place that all views read and change. The address keeps it. */
+export class Store {
+  private selection: Selection;
+  private readonly listeners: Listener[] = [];
+
+  constructor(private readonly models: readonly RunModel[]) {
+    const first = models[0];
+    this.selection = { run: 0, frame: first?.firstFrame() ?? 0, against: "match", filter: "all" };
+    this.selection = this.valid(this.fromAddress());
+    addEventListener("hashchange", () => this.change(this.fromAddress()));
+  }
+
+  get now(): Selection {
+    return this.selection;
+  }
+
+  get model(): RunModel {
+    const model = this.models[this.selection.run];
+    if (!model) throw new Error(`there is no run ${this.selection.run}`);
+    return model;
+  }
+
+  subscribe(listener: Listener): void {
+    this.listeners.push(listener);
+  }
+
+  select(frame: number, against: Against = "match"): void {
+    this.change({ frame, against });
+  }
+
+  /** Where the filter leaves the selected frame out, the next that it lets through is selected. */
+  filter(filter: Filter): void {
+    const frames = this.model.framesIn(filter);
+    const { frame, against } = this.selection;
+    if (frames.length === 0 || frames.includes(frame)) {
+      this.change({ filter, against });
+    } else {
+      const next = frames.find((candidate) => candidate > frame) ?? frames.at(-1) ?? frame;
+      this.change({ filter, frame: next, against: "match" });
+    }
+  }
+
+  change(to: Partial<Selection>): void {
+    const before = this.selection;
+    this.selection = this.valid({ ...before, ...to });
+    const { run, frame, against, filter } = this.selection;
+    const same =
+      run === before.run &&
+      frame === before.frame &&
+      against === before.against &&
+      filter === before.filter;
+    if (same) return;
+    this.toAddress();
+    for (const listener of this.listeners) listener(this.selection, before);
+  }
+
+  /** By `step` frames along those that the filter lets through. */
+  walk(step: number): void {
+    const frames = this.model.framesIn(this.selection.filter);
+    const { frame } = this.selection;
+    const after = frames.findIndex((candidate) => candidate >= frame);
+    const at = after < 0 ? frames.length : after;
+    const isMember = frames[at] === frame;
+    const to = step > 0 && !isMember ? at + step - 1 : at + step;
+    const next = frames[Math.min(Math.max(to, 0), frames.length - 1)];
+    if (next !== undefined) this.select(next);
+  }
+
+  walkToEnd(end: "first" | "last"): void {
+    const frames = this.model.framesIn(this.selection.filter);
+    const frame = end === "first" ? frames[0] : frames.at(-1);
+    if (frame !== undefined) this.select(frame);
+  }
+
+  private valid(wanted: Selection): Selection {
+    const run = this.models[wanted.run] ? wanted.run : 0;
+    const frames = this.models[run]?.frames ?? 0;
+    const frame = Math.min(Math.max(0, wanted.frame), Math.max(0, frames - 1));
+    const isFrame = typeof wanted.against !== "number" || wanted.against < frames;
+    return { ...wanted, run, frame, against: isFrame ? wanted.against : "match" };
+  }
+
+  private fromAddress(): Selection {
+    const fields = new URLSearchParams(location.hash.slice(1));
+    const number = (name: string) => {
+      const text = fields.get(name);
+      return text !== null && /^\d{1,9}$/.test(text) ? Number(text) : null;
+    };
+    const filter = kFilters.find((name) => name === fields.get("show"));
+    const against = fields.get("with") === "truth" ? "truth" : (number("with") ?? "match");
+    return {
+      run: number("run") ?? this.selection.run,
+      frame: number("frame") ?? this.selection.frame,
+      against,
+      filter: filter ?? "all",
+    };
+  }
+
+  private toAddress(): void {
+    const { run, frame, against, filter } = this.selection;
+    const fields = [`frame=${frame}`];
+    if (run > 0) fields.unshift(`run=${run}`);
+    if (against !== "match") fields.push(`with=${against}`);
+    if (filter !== "all") fields.push(`show=${filter}`);
+    history.replaceState(null, "", `#${fields.join("&")}`);
+  }
+}

@@ -1,0 +1,102 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+import { comparison } from "./comparison.ts";
+import { html } from "./dom.ts";
+import * as format from "./format.ts";
+import { keyNumbers } from "./key_numbers.ts";
+import type { Run } from "./report_data.ts";
+import type { RunModel } from "./run_model.ts";
+import type { Selection, Store } from "./store.ts";
+import type { View } from "./view.ts";
+
+/** What was found, in one sentence. */
+export function sentenceOf(model: RunModel): string {
+  const { evaluation } = model.run;
+  const loops = model.framesIn("loops").length;
+  const frames = format.counted(model.frames, "frame");
+  if (!evaluation) {
+    return `${capital(format.counted(loops, "loop"))} found in ${frames}; no truth says whether they are right.`;
+  }
+  const { right, positives, wrong, tolerated } = evaluation;
+  const found =
+    positives === 0
+      ? "No place was visited twice"
+      : `${format.count(right)} of ${format.counted(positives, "revisit")} found`;
+  const also = tolerated > 0 ? `, ${format.count(tolerated)} tolerated` : "";
+  return `${found}, ${format.counted(wrong, "wrong loop")}${also}.`;
+}
+
+const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
+
+/** Name, sentence, numbers; a table where there are several runs. */
+export class Summary implements View {
+  readonly element: HTMLElement;
+  private readonly title = html("h1");
+  private readonly input = html("p", { class: "input" });
+  private readonly sentence = html("p", { class: "lead", "data-key": "sentence" });
+  private readonly notice = html("p", { class: "notice", role: "note" });
+  private readonly numbers = html("div", { class: "key-numbers" });
+  private readonly origin = html("p", { class: "origin" });
+  private readonly table: ReturnType<typeof comparison> | null;
+
+  constructor(
+    store: Store,
+    private readonly models: readonly RunModel[],
+  ) {
+    this.table = models.length > 1 ? comparison(store, models) : null;
+    this.element = html(
+      "header",
+      { id: "summary" },
+      this.title,
+      this.input,
+      this.sentence,
+      this.notice,
+      this.table?.element ?? null,
+      this.numbers,
+      this.origin,
+    );
+  }
+
+  showRun(model: RunModel): void {
+    const { run } = model;
+    this.title.textContent = run.name;
+    document.title = `${run.name} - loopbit report`;
+    this.input.textContent = run.record?.input.description ?? "";
+    this.sentence.textContent = sentenceOf(model);
+    const notice = noticeOf(run);
+    this.notice.textContent = notice;
+    this.notice.hidden = notice === "";
+    this.numbers.replaceChildren(...keyNumbers(model, this.models.length > 1));
+    this.origin.replaceChildren(...originOf(run));
+    this.table?.show();
+  }
+
+  showSelection(_: Selection): void {}
+}
+
+function noticeOf({ record, times_ms: times }: Run): string {
+  if (record) {
+    if (record.stopped_by === "end") return "";
+    return record.stopped_by === "interrupt"
+      ? "The run was interrupted; this is what it found until then."
+      : `The run stopped early: ${record.stopped_by}`;
+  }
+  return times
+    ? "There is no run.json: the run was cut off, and its options and machine are not known."
+    : "";
+}
+
+function originOf({ record, evaluation }: Run): HTMLElement[] {
+  const parts: string[] = [];
+  if (record) {
+    const { machine } = record;
+    parts.push(
+      `loopbit ${record.loopbit}`,
+      `${machine.processor}, ${format.counted(machine.cores, "core")}, ${machine.kernel} kernels`,
+      format.counted(record.threads, "thread"),
+    );
+  }
+  if (evaluation) parts.push(`protocol: ${evaluation.protocol ?? "truth as listed in its file"}`);
+  return parts.map((part) => html("span", {}, part));
+}

@@ -1,0 +1,214 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+
+import { type Bounds, padded } from "./bounds.ts";
+import { svg } from "./dom.ts";
+import { ringOf } from "./frame_ring.ts";
+import { frameText } from "./frame_text.ts";
+import { legend } from "./legend.ts";
+import { Plot } from "./plot.ts";
+import { nearest, type Projection } from "./projection.ts";
+import type { RunModel } from "./run_model.ts";
+import type { Selection, Store } from "./store.ts";
+import type { Theme } from "./theme.ts";
+import { drawMarks, isMarked, kMarked, markRadius, type Point } from "./verdicts.ts";
+import { caption, section, type View } from "./view.ts";
+
+/** A marked frame is meant even where the path comes a little nearer. */
+const kMarkedFirst_px = -6;
+const kCurveSteps = 10;
+const kManyLoops = 1500;
+
+/** The drive from above with its loops; without positions the frames on a ring. */
+export class Trajectory implements View {
+  readonly element: HTMLElement;
+  private readonly caption = caption();
+  private readonly legend = legend();
+  private readonly plot: Plot;
+  private isRing = false;
+  private places: (Point | null)[] = [];
+
+  constructor(private readonly store: Store) {
+    this.plot = new Plot({
+      label: "Trajectory. Frames with their loops.",
+      xLabel: "m",
+      yLabel: "m",
+      height: (width) => Math.max(280, Math.min(width * 0.62, 560)),
+      zoom: "xy",
+      equalAxes: true,
+      bounds: () => this.bounds(),
+      draw: (ctx, to, theme) => this.draw(ctx, to, theme),
+      hit: (pixel, to) => {
+        const frame = this.frameAt(pixel, to);
+        const at = frame === null ? null : this.places[frame];
+        return frame === null || !at
+          ? null
+          : { frame, at, text: frameText(this.store.model, frame) };
+      },
+      selected: (to) => this.selected(to),
+      select: (hit) => this.store.select(hit.frame),
+    });
+    this.element = section(
+      "trajectory",
+      "Trajectory",
+      this.caption,
+      this.plot.controls(),
+      this.legend.element,
+      this.plot.element,
+    );
+  }
+
+  showRun(model: RunModel): void {
+    const { positions, frames } = model.run;
+    this.isRing = positions === null;
+    this.places = positions
+      ? positions.x_m.map((x, i) => {
+          const y = positions.y_m[i] ?? null;
+          return x === null || y === null ? null : { x, y };
+        })
+      : ringOf(frames);
+    this.caption.textContent = this.isRing
+      ? "The frames in order around a ring, clockwise from the top, with a line from each query to its match. --poses FILE shows the drive as it was."
+      : "The drive from above, in metres, with a line from each query to its match. Click a frame to see its pair.";
+    this.element.classList.toggle("ring", this.isRing);
+    this.legend.show(model);
+    this.plot.reset();
+  }
+
+  showSelection(_: Selection): void {
+    this.plot.mark();
+  }
+
+  private bounds(): Bounds {
+    const x: number[] = [];
+    const y: number[] = [];
+    for (const place of this.places) {
+      if (!place) continue;
+      x.push(place.x);
+      y.push(place.y);
+    }
+    if (x.length === 0) return { x: [-1, 1], y: [-1, 1] };
+    const range = (values: number[]) =>
+      padded(
+        [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))],
+        0.06,
+      );
+    return { x: range(x), y: range(y) };
+  }
+
+  private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+    this.drawPath(ctx, to, theme);
+    const model = this.store.model;
+    const count = model.framesIn("loops").length + model.framesIn("missed").length;
+    const radius = markRadius(count) * to.ratio;
+    for (const verdict of kMarked) {
+      if (verdict !== "missed") this.drawLoops(ctx, to, theme, verdict, count);
+    }
+    for (const verdict of kMarked) {
+      const points: Point[] = [];
+      for (const frame of model.framesMarked(verdict)) {
+        const place = this.places[frame];
+        if (place) points.push({ x: to.x(place.x), y: to.y(place.y) });
+      }
+      drawMarks(ctx, verdict, points, radius, theme);
+    }
+    this.drawEnds(ctx, to, theme);
+  }
+
+  private drawPath(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+    const path = new Path2D();
+    let isDown = false;
+    for (const place of this.places) {
+      if (place && isDown) path.lineTo(to.x(place.x), to.y(place.y));
+      else if (place) path.moveTo(to.x(place.x), to.y(place.y));
+      isDown = place !== null;
+    }
+    ctx.strokeStyle = theme.path;
+    ctx.lineWidth = 2 * to.ratio;
+    ctx.lineJoin = "round";
+    ctx.stroke(path);
+  }
+
+  private drawLoops(
+    ctx: CanvasRenderingContext2D,
+    to: Projection,
+    theme: Theme,
+    verdict: (typeof kMarked)[number],
+    count: number,
+  ): void {
+    const model = this.store.model;
+    const path = new Path2D();
+    for (const frame of model.framesMarked(verdict)) {
+      const from = this.places[frame];
+      const match = this.places[model.match(frame) ?? -1];
+      if (from && match) this.addLink(path, to, from, match, count);
+    }
+    ctx.strokeStyle = theme[verdict];
+    ctx.globalAlpha = verdict === "wrong" ? 0.9 : Math.max(0.15, 0.6 - count / 4000);
+    ctx.lineWidth = (verdict === "wrong" ? 1.5 : 1.1) * to.ratio;
+    ctx.stroke(path);
+    ctx.globalAlpha = 1;
+  }
+
+  /** Straight in the plane; towards the middle on the ring, so that chords come apart. */
+  private addLink(path: Path2D, to: Projection, from: Point, match: Point, count: number): void {
+    path.moveTo(to.x(from.x), to.y(from.y));
+    const steps = this.isRing && count < kManyLoops ? kCurveSteps : 1;
+    for (let step = 1; step <= steps; ++step) {
+      const t = step / steps;
+      const pull = steps === 1 ? 1 : 1 - 1.2 * t * (1 - t);
+      const x = (from.x + (match.x - from.x) * t) * pull;
+      const y = (from.y + (match.y - from.y) * t) * pull;
+      path.lineTo(to.x(x), to.y(y));
+    }
+  }
+
+  private drawEnds(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+    const known = this.places.filter((place) => place !== null);
+    const ends: [Point | undefined, string][] = [
+      [known[0], "start"],
+      [known.at(-1), "end"],
+    ];
+    ctx.font = `${12 * to.ratio}px ${theme.font}`;
+    ctx.lineWidth = 4 * to.ratio;
+    for (const [place, name] of known.length > 1 ? ends : ends.slice(0, 1)) {
+      if (!place) continue;
+      const away = name === "start" ? 1 : -1;
+      const x = to.x(place.x) + 9 * away * to.ratio;
+      const y = to.y(place.y) - 9 * to.ratio;
+      ctx.textAlign = away > 0 ? "left" : "right";
+      ctx.strokeStyle = theme.paper;
+      ctx.fillStyle = theme.muted;
+      ctx.strokeText(name, x, y);
+      ctx.fillText(name, x, y);
+    }
+  }
+
+  private frameAt(pixel: Point, to: Projection): number | null {
+    const model = this.store.model;
+    return nearest(
+      to,
+      pixel,
+      this.places.length,
+      (frame) => this.places[frame] ?? null,
+      (frame) => (isMarked(model.verdict(frame)) ? kMarkedFirst_px : 0),
+    );
+  }
+
+  private selected(to: Projection): SVGElement[] {
+    const { frame } = this.store.now;
+    const partner = this.store.model.partner(this.store.now);
+    const marks: SVGElement[] = [];
+    const from = this.places[frame];
+    const match = partner === null ? undefined : this.places[partner];
+    if (!from) return marks;
+    const [x1, y1] = [to.x(from.x), to.y(from.y)];
+    if (match) {
+      const [x2, y2] = [to.x(match.x), to.y(match.y)];
+      marks.push(svg("line", { class: "link", x1, y1, x2, y2 }));
+      marks.push(svg("circle", { class: "partner", cx: x2, cy: y2, r: 6 }));
+    }
+    marks.push(svg("circle", { class: "selected", cx: x1, cy: y1, r: 9, "data-frame": frame }));
+    return marks;
+  }
+}

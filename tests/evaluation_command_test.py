@@ -1,0 +1,287 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""eval, compare, report and reproduce as a user meets them."""
+
+import json
+import os
+import pathlib
+import shutil
+import struct
+import unittest
+
+from loopbit_command import FRAMES, CommandTest, loopbit, rows
+
+
+def write_mat(path, name, size, cells):
+    """A MAT-file of version 5 with one dense matrix of bytes, `cells` of which are 1."""
+    def element(kind, data):
+        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    dense = bytearray(size * size)
+    for row, column in cells:
+        dense[column * size + row] = 1
+    matrix = (element(6, struct.pack("<II", 9, 0)) + element(5, struct.pack("<ii", size, size))
+              + element(1, name.encode()) + element(2, bytes(dense)))
+    header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
+    path.write_bytes(header + element(14, matrix))
+
+
+class EvaluationCommandTest(CommandTest):
+    def file(self, name, text):
+        path = self.scratch / name
+        path.write_text(text)
+        return path
+
+    def score(self, *arguments):
+        scored = loopbit("eval", *arguments, "--json")
+        self.assertEqual(scored.returncode, 0, scored.stderr)
+        return json.loads(scored.stdout)
+
+    # eval
+
+    def test_a_run_folder_is_scored_as_its_run_was(self):
+        record = json.loads((self.reference / "run.json").read_text())["score"]
+        scored = self.score(self.reference)
+        self.assertEqual({key: scored[key] for key in record}, record)
+        self.assertEqual(self.score(self.reference / "loops.csv", "--truth",
+                                    self.dataset / "truth.csv", "--not-false",
+                                    self.dataset / "not_false.csv"), scored)
+
+    def test_any_detectors_matches_are_scored(self):
+        truth = self.file("truth.csv", "query,match\n5,1\n6,2\n7,3\n")
+        matches = self.file("other.csv", "5,1,0.9\n6,4,0.5\n8,0,0.1\n")
+        scored = self.score(matches, "--truth", truth)
+        self.assertEqual((scored["positives"], scored["right"], scored["wrong"]), (3, 1, 2))
+        self.assertAlmostEqual(scored["recall_at_full_precision"], 1 / 3)
+        self.assertEqual(scored["wrong_loops"][0], {"query": 6, "match": 4, "score": 0.5})
+        self.assertEqual(self.score(matches, "--truth", truth, "--tolerance", 2)["right"], 2)
+        text = loopbit("eval", matches, "--truth", truth).stdout
+        self.assertIn("1 of 3 revisits found: recall 0.3333", text)
+        self.assertIn("2 wrong loops: precision 0.3333", text)
+        self.assertIn("recall 0.3333 at 100 % precision (score 0.9 or more)", text)
+
+    def test_poses_and_matrices_say_what_is_true(self):
+        poses = self.dataset / "poses.txt"
+        near = self.score(self.reference, "--truth", poses, "--truth-set", "min_gap_frames=10",
+                          "--truth-set", "radius_m=5")
+        wide = self.score(self.reference, "--truth", poses, "--truth-set", "min_gap_frames=10",
+                          "--truth-set", "radius_m=20")
+        self.assertGreater(near["positives"], 0)
+        self.assertGreater(wide["pairs"]["positives"], near["pairs"]["positives"])
+        matrix = self.scratch / "truth.mat"
+        write_mat(matrix, "truth", FRAMES, [(FRAMES - 1, 0), (FRAMES - 2, 0), (FRAMES - 2, 1)])
+        scored = self.score(self.reference, "--truth", matrix)
+        self.assertEqual((scored["positives"], scored["pairs"]["positives"]), (2, 3))
+
+    def test_a_protocol_fixes_its_settings(self):
+        matrix = self.scratch / "truth.mat"
+        write_mat(matrix, "truth", 200, [(150, 50)])
+        matches = self.file("other.csv", "150,90\n")
+        self.assertEqual(self.score(matches, "--truth", matrix)["right"], 0)
+        scored = self.score(matches, "--truth", matrix, "--protocol", "ibow-lcd")
+        self.assertEqual((scored["right"], scored["protocol"]), (1, "ibow-lcd"))
+        self.assertEqual(scored["tolerance_frames"], 40)
+        both = ["eval", matches, "--truth", matrix, "--protocol"]
+        self.assert_fails(loopbit(*both, "ibow-lcd", "--tolerance", 1), 2, "--tolerance", "fixes")
+        self.assert_fails(loopbit(*both, "kitti"), 2, "poses", matrix, "loop matrix")
+        self.assert_fails(loopbit(*both, "orb"), 2, "'orb'", "tsintotas")
+
+    def test_views_of_a_matrix_are_frames_in_turn(self):
+        matrix = self.scratch / "truth.mat"
+        write_mat(matrix, "truth", 40, [(31, 1)])
+        matches = self.file("other.csv", "15,0\n")
+        self.assertEqual(self.score(matches, "--truth", matrix)["positives"], 1)
+        self.assertEqual(self.score(matches, "--truth", matrix)["right"], 0)
+        self.assertEqual(self.score(matches, "--truth", matrix, "--truth-views", 2)["right"], 1)
+        self.assertEqual(self.score(matches, "--truth", matrix, "--protocol", "fab-map")["right"], 1)
+
+    def test_frames_left_out_of_a_run_are_left_out_of_its_truth(self):
+        ran = loopbit("run", self.images, "--out", self.out, "--every", 2, "--truth",
+                      self.dataset / "truth.csv", "--poses", self.dataset / "poses.txt")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        kept = (self.out / "truth.csv").read_text().splitlines()[1:]
+        queries = {int(line.split(",")[0]) for line in kept}
+        full = (self.dataset / "truth.csv").read_text().splitlines()[1:]
+        self.assertLessEqual(queries, {int(line.split(",")[0]) // 2 for line in full
+                                       if int(line.split(",")[0]) % 2 == 0})
+        self.assertGreater(len(queries), 0)
+        positions = (self.out / "positions.csv").read_text().splitlines()[1:]
+        poses = (self.dataset / "poses.txt").read_text().splitlines()
+        self.assertEqual(len(positions), (FRAMES + 1) // 2)
+        self.assertAlmostEqual(float(positions[3].split(",")[1]), float(poses[6].split()[3]), 3)
+        again = self.score(self.out, "--truth", self.dataset / "truth.csv")
+        record = json.loads((self.out / "run.json").read_text())["score"]
+        self.assertEqual(again["positives"], record["positives"])
+
+    def test_a_trajectory_goes_by_the_times_of_the_frames(self):
+        data = self.scratch / "timed"
+        (data / "image_0").mkdir(parents=True)
+        for image in sorted(self.images.iterdir())[:20]:
+            shutil.copy(image, data / "image_0")
+        (data / "times.txt").write_text("".join(f"{0.1 * i:.3f}\n" for i in range(20)))
+        poses = self.file("tum.txt", "".join(f"{100 if i > 25 else 0.05 * i:.3f} {i} 0 0 0 0 0 1\n"
+                                             for i in range(40)))
+        ran = loopbit("run", data, "--out", self.out, "--poses", poses)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        positions = (self.out / "positions.csv").read_text().splitlines()[1:]
+        self.assertEqual([line.split(",")[:2] for line in positions[:3]],
+                         [["0", "0.0000"], ["1", "2.0000"], ["2", "4.0000"]])
+        self.assertEqual(len(positions), 13)  # up to 1.25 s
+        self.assert_fails(loopbit("eval", self.file("other.csv", "9,1\n"), "--truth", poses), 3,
+                          poses, "times")
+
+    def test_bad_truth_and_detections(self):
+        truth = self.file("truth.csv", "5,1\n")
+        matches = self.file("other.csv", "5,1\n")
+        cases = [
+            (2, ["eval", matches], [matches, "--truth"]),
+            (3, ["eval", self.scratch / "none", "--truth", truth], [self.scratch / "none"]),
+            (3, ["eval", self.scratch, "--truth", truth], [self.scratch, "loops.csv"]),
+            (3, ["eval", self.file("bad.csv", "5,x\n"), "--truth", truth], ["line 1", "5,x"]),
+            (3, ["eval", matches, "--truth", self.file("short.mat", "MATLAB")], ["short.mat"]),
+            (2, ["eval", matches, "--truth", truth, "--truth-set", "radius_m=0"], ["radius_m", "0"]),
+            (2, ["eval", matches, "--truth", truth, "--truth-set", "metres=2"], ["metres"]),
+            (2, ["eval", matches, "--truth", truth, "--truth-set", "radius_m"], ["NAME=VALUE"]),
+        ]
+        for code, command, words in cases:
+            with self.subTest(command=command):
+                self.assert_fails(loopbit(*command), code, *words)
+
+    def test_a_truth_that_fits_no_frame_costs_no_run(self):
+        short = self.scratch / "short.mat"
+        write_mat(short, "truth", 3, [(2, 0)])
+        ran = loopbit("run", self.few_images(), "--out", self.out, "--truth", short)
+        self.assert_fails(ran, 3, short, "14")
+        self.assertEqual(len(rows(self.out)), 14)
+        self.assertTrue((self.out / "run.json").exists())
+
+    # report and compare
+
+    def test_a_run_ends_with_a_report_unless_unwanted(self):
+        self.assertIn(str(self.reference / "report.html"), self.reference_output)
+        self.assertIn("evidence.db", os.listdir(self.reference))
+        plain = loopbit("run", self.few_images(), "--out", self.out, "--no-report")
+        self.assertEqual(plain.returncode, 0, plain.stderr)
+        self.assertEqual(sorted(os.listdir(self.out)), ["loops.csv", "run.json"])
+        made = loopbit("report", self.out)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        self.assertIn("report.html", os.listdir(self.out))
+
+    def test_the_size_of_a_report_can_be_set(self):
+        page = self.scratch / "page.html"
+        sizes = []
+        for budget in (0, 0.1, 50):
+            made = loopbit("report", self.reference, "--out", page, "--pictures-mb", budget)
+            self.assertEqual(made.returncode, 0, made.stderr)
+            sizes.append(page.stat().st_size)
+        self.assertLess(sizes[1] - sizes[0], 0.15e6)
+        self.assertGreater(sizes[1], sizes[0])
+        self.assertGreater(sizes[2], sizes[1])
+
+    def test_a_report_goes_where_it_is_told_or_says_why_not(self):
+        matches = self.file("other.csv", "5,1\n")
+        self.assert_fails(loopbit("report", matches), 2, matches, "--out")
+        self.assert_fails(loopbit("report", matches, "--out", self.scratch / "no/page.html"), 4,
+                          self.scratch / "no/page.html")
+        page = self.scratch / "page.html"
+        self.assertEqual(loopbit("report", matches, "--out", page).returncode, 0)
+        self.assert_fails(loopbit("report", matches, "--out", page, "--open",
+                                  environment={"PATH": ""}), 4, page, "xdg-open")
+
+    def test_damaged_evidence_is_named(self):
+        folder = self.scratch / "run"
+        shutil.copytree(self.reference, folder)
+        (folder / "evidence.db").write_bytes(b"SQLite format 3\0" + bytes(2000))
+        self.assert_fails(loopbit("report", folder), 3, folder / "evidence.db")
+
+    def test_runs_stand_side_by_side(self):
+        strict = self.scratch / "strict"
+        ran = loopbit("run", self.images, "--out", strict, "--set", "decision.min_score=60")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        other = self.file("dbow2.csv", "query,match,score\n30,1,0.5\n")
+        page = self.scratch / "page.html"
+        compared = loopbit("compare", self.reference, strict, f"DBoW2={other}", "--out", page)
+        self.assertEqual(compared.returncode, 0, compared.stderr)
+        lines = compared.stdout.splitlines()
+        self.assertEqual([line.split()[0] for line in lines[1:4]], ["reference", "strict", "DBoW2"])
+        table = json.loads(loopbit("compare", self.reference, strict, "--json").stdout)
+        self.assertEqual(table[0]["recall"], self.score(self.reference)["recall"])
+        self.assertLessEqual(table[1]["recall"], table[0]["recall"])
+        self.assertEqual(table[0]["positives"], table[1]["positives"])
+        self.assertIn("p99", table[0]["time_ms"])
+        self.assertGreater(page.stat().st_size, 10000)
+
+    def test_runs_that_cannot_be_compared(self):
+        short = self.scratch / "short"
+        ran = loopbit("run", self.few_images(), "--out", short)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assert_fails(loopbit("compare", self.reference, short), 3, "14", str(FRAMES))
+        self.assert_fails(loopbit("compare", short, short), 2, "--truth")
+        one = loopbit("compare", self.reference)
+        self.assertEqual(one.returncode, 2)
+        self.assertIn("RUN", one.stderr)
+
+    # reproduce
+
+    def public_data(self):
+        """KITTI 00 and City Centre as they are laid out, with pictures of our own."""
+        data = self.scratch / "data"
+        images = sorted(self.images.iterdir())[:12]
+        kitti = data / "dataset" / "sequences" / "00"
+        (kitti / "image_0").mkdir(parents=True)
+        for image in images:
+            shutil.copy(image, kitti / "image_0")
+        (kitti / "times.txt").write_text("".join(f"{0.1 * i}\n" for i in range(len(images))))
+        (data / "dataset" / "poses").mkdir()
+        shutil.copy(self.dataset / "poses.txt", data / "dataset" / "poses" / "00.txt")
+        city = data / "City_Centre"
+        (city / "Images").mkdir(parents=True)
+        for number, image in enumerate(images + images):
+            shutil.copy(image, city / "Images" / f"{number + 1:04}.png")
+        write_mat(city / "CityCentreGroundTruth.mat", "truth", 24, [(12, 0), (23, 11)])
+        return data
+
+    def test_the_papers_tables_are_run_on_what_is_there(self):
+        ran = loopbit("reproduce", self.public_data(), "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        table = ran.stdout[ran.stdout.index("Recall in percent"):]
+        kitti = next(line for line in table.splitlines() if line.startswith("KITTI 00"))
+        self.assertEqual(kitti.split()[-4:], ["54.9", "130", "32.2", "57.2"])
+        city = next(line for line in table.splitlines() if line.startswith("City Centre"))
+        self.assertEqual(city.split()[-4:], ["27.7", "86", "-", "-"])
+        left_out = table[table.index("Not found"):].split("\n", 1)[1]
+        self.assertEqual(left_out.split("\n")[:3], ["  KITTI 02", "  KITTI 05", "  New College"])
+        record = json.loads((self.out / "citycentre" / "run.json").read_text())
+        self.assertEqual(record["counts"]["frames"], 24)
+        self.assertEqual(record["score"]["positives"], 2)
+        self.assertEqual(json.loads((self.out / "kitti00" / "run.json").read_text())["score"]
+                         ["protocol"], "kitti")
+
+    def test_a_matrix_of_left_images_only_takes_every_other_image(self):
+        data = self.public_data()
+        write_mat(data / "City_Centre" / "CityCentreGroundTruth.mat", "truth", 12, [(11, 0)])
+        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        record = json.loads((self.out / "citycentre" / "run.json").read_text())
+        self.assertEqual((record["counts"]["frames"], record["input"]["every"]), (12, 2))
+
+    def test_no_public_data_at_all(self):
+        empty = self.scratch / "empty"
+        empty.mkdir()
+        self.assert_fails(loopbit("reproduce", empty, "--out", self.out), 3, empty, "--help")
+
+    # Real results of others.
+
+    def test_published_loops_of_ibow_lcd(self):
+        if not os.environ.get("LOOPBIT_DATA"):
+            self.skipTest("LOOPBIT_DATA names no folder of real data")
+        truth = pathlib.Path(os.environ["LOOPBIT_DATA"]) / "truth"
+        scored = self.score(truth / "published" / "ibow_lcd_city_centre.csv", "--truth",
+                            truth / "mat" / "city_centre_htmap.mat", "--protocol", "ibow-lcd")
+        self.assertEqual((scored["right"], scored["wrong"], scored["positives"]), (495, 0, 561))
+        self.assertAlmostEqual(scored["recall"], 0.8824, 4)
+
+
+if __name__ == "__main__":
+    unittest.main()

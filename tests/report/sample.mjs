@@ -1,0 +1,318 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+// Made-up but plausible report data, the same for the same options, for pages to be looked at and
+// tested without a detector:
+//
+//   node sample.mjs --page report.html --out FILE [--frames N] [--runs N] [--no-truth] [--no-poses]
+//                   [--no-pictures] [--no-loops] [--external] [--unreadable] [--pictures-mb MB]
+import { readFileSync, writeFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
+import { contentAt, distance_m, evidenceAt, lap_m, pngOf, positionAt, random, similarity } from "./sample_world.mjs";
+
+const kTolerance = 4;
+const kThreshold = 18;
+const kMaxSide = 640;
+const kStatuses = ["loop", "no_earlier_place", "no_similar_place", "few_matches", "no_geometry", "low_score", "unreadable"];
+const kSteps = ["content", "retrieval", "features", "verification"];
+
+const statusOf = (name) => kStatuses.indexOf(name);
+const round = (x, digits) => Number(x.toFixed(digits));
+
+/** Two laps and a half, with some swaying. */
+function placesOf(frames) {
+  return Array.from({ length: frames }, (_, i) => ({
+    along_m: (2.4 * lap_m * i) / Math.max(1, frames),
+    aside_m: 0.5 * Math.sin(i / 9) + (0.6 * i) / frames,
+  }));
+}
+
+/** True earlier places: the lap before, within 2.5 m. */
+function truthOf(places) {
+  const same_place = [];
+  const near_place = [];
+  const perMetre = places.length / (2.4 * lap_m);
+  const reach = Math.max(0, Math.round(2.5 * perMetre));
+  const lap = Math.round(lap_m * perMetre);
+  for (const [query, { along_m }] of places.entries()) {
+    if (along_m < lap_m || lap === 0) continue;
+    const first = Math.max(0, query - lap - reach);
+    const last = Math.max(first, Math.min(query - 1, query - lap + reach));
+    same_place.push(query, first, last);
+    near_place.push(query, Math.max(0, first - 2 * reach), last + 2 * reach);
+  }
+  return { same_place, near_place };
+}
+
+const covers = (triples, query, match) => {
+  for (let i = 0; i < triples.length; i += 3) {
+    if (triples[i] === query && match >= triples[i + 1] && match <= triples[i + 2]) return true;
+  }
+  return false;
+};
+
+/** What a detector of some `quality`, 0 to 1, says. */
+function detect(places, quality, options, next) {
+  const frames = places.length;
+  const lap = Math.round((lap_m * frames) / (2.4 * lap_m));
+  const columns = { status: [], match: [], score: [], matches: [], inliers: [] };
+  for (let frame = 0; frame < frames; ++frame) {
+    const isUnreadable = options.unreadable && frame % 37 === 5;
+    const isEarly = frame < Math.max(2, frames / 20);
+    const isRevisit = places[frame].along_m > lap_m && !options.noLoops;
+    const jitter = Math.round((next() - 0.5) * 0.012 * frames);
+    const isAstray = !isRevisit || next() > 0.93 + 0.06 * quality;
+    const anywhere = Math.floor(next() * Math.max(1, frame - frames / 20));
+    const match = isAstray ? anywhere : Math.max(0, Math.min(frame - 1, frame - lap + jitter));
+    const strength = isRevisit && !isAstray ? 12 + 60 * quality * next() ** 1.5 + 8 : 15 * next() ** 2;
+    const score = isAstray && isRevisit && next() < 0.2 ? 19.5 : round(strength, 1);
+    const isNothing = isUnreadable || isEarly;
+    columns.match.push(isNothing ? -1 : match);
+    columns.score.push(isNothing ? 0 : score);
+    columns.inliers.push(isNothing ? 0 : Math.floor(score * 1.1));
+    columns.matches.push(isNothing ? 0 : Math.floor(score * 1.4 + 8));
+    const low = score < 4 ? "few_matches" : score < 7 ? "no_geometry" : "low_score";
+    const judged = score >= kThreshold ? "loop" : low;
+    columns.status.push(statusOf(isUnreadable ? "unreadable" : isEarly ? "no_earlier_place" : judged));
+  }
+  return columns;
+}
+
+function verdictsOf(columns, truth) {
+  return columns.match.map((match, frame) => {
+    const isLoop = columns.status[frame] === statusOf("loop");
+    if (!truth) return isLoop ? "loop" : "none";
+    const isRight = isLoop && covers(truth.same_place, frame, match);
+    const isNear = isLoop && covers(truth.near_place, frame, match);
+    if (isRight) return "right";
+    if (isLoop && !isNear) return "wrong";
+    if (truth.same_place.some((query, i) => i % 3 === 0 && query === frame)) return "missed";
+    return isLoop ? "tolerated" : "none";
+  });
+}
+
+function wilson(hits, trials) {
+  if (trials === 0) return [0, 1];
+  const z = 1.959963984540054;
+  const scale = 1 / (1 + (z * z) / trials);
+  const p = hits / trials;
+  const half = scale * z * Math.sqrt((p * (1 - p)) / trials + (z * z) / (4 * trials * trials));
+  const middle = scale * (p + (z * z) / (2 * trials));
+  return [Math.max(0, middle - half), Math.min(1, middle + half)];
+}
+
+function curveOf(columns, truth, positives) {
+  const ranked = columns.match
+    .map((match, frame) => ({ frame, match, score: columns.score[frame] }))
+    .filter(({ match }) => match >= 0)
+    .sort((a, b) => b.score - a.score);
+  const curve = [];
+  let right = 0;
+  let wrong = 0;
+  for (const [i, { frame, match, score }] of ranked.entries()) {
+    if (covers(truth.same_place, frame, match)) ++right;
+    else if (!covers(truth.near_place, frame, match)) ++wrong;
+    if (ranked[i + 1]?.score === score) continue;
+    const precision = right + wrong === 0 ? 1 : right / (right + wrong);
+    curve.push({ score, right, wrong, precision, recall: positives === 0 ? 0 : right / positives });
+  }
+  return curve;
+}
+
+function evaluationOf(columns, verdicts, truth) {
+  const positives = truth.same_place.length / 3;
+  const tally = (name) => verdicts.filter((verdict) => verdict === name).length;
+  const [right, wrong, tolerated] = ["right", "wrong", "tolerated"].map(tally);
+  const curve = curveOf(columns, truth, positives);
+  const full = curve.filter((point) => point.wrong === 0).at(-1);
+  let before = 0;
+  let average_precision = 0;
+  for (const { precision, recall } of curve) {
+    average_precision += precision * (recall - before);
+    before = recall;
+  }
+  const pairs = truth.same_place.reduce((sum, last, i, t) => (i % 3 === 2 ? sum + last - t[i - 1] + 1 : sum), 0);
+  return {
+    protocol: null,
+    positives,
+    right,
+    tolerated,
+    wrong,
+    ignored: 0,
+    recall: positives === 0 ? 0 : right / positives,
+    precision: right + wrong === 0 ? 1 : right / (right + wrong),
+    precision_interval: wilson(right, right + wrong),
+    recall_at_full_precision: full?.recall ?? 0,
+    score_at_full_precision: full?.score ?? null,
+    average_precision,
+    pairs: { positives: pairs, right, wrong, recall: pairs === 0 ? 0 : right / pairs, precision: 1 },
+    curve,
+  };
+}
+
+function timesOf(frames, slowness, next) {
+  const tail = () => 1 + (next() < 0.03 ? 1.2 * next() : 0.15 * next());
+  const of = (base, growth) =>
+    Array.from({ length: frames }, (_, i) => round((base + (growth * i) / frames) * slowness * tail(), 3));
+  return { content: of(0.4, 0), retrieval: of(0.02, 0.5), features: of(14, 0), verification: of(1, 13) };
+}
+
+function summaryOf(times) {
+  const sorted = [...times].sort((a, b) => a - b);
+  const at = (q) => sorted[Math.floor(q * (sorted.length - 1))] ?? 0;
+  const mean = sorted.reduce((sum, time) => sum + time, 0) / Math.max(1, sorted.length);
+  return { mean, p50: at(0.5), p99: at(0.99), max: at(1) };
+}
+
+function recordOf(columns, times, frames) {
+  const readable = (of) => of.filter((_, frame) => columns.status[frame] !== statusOf("unreadable"));
+  const total = times.content.map((_, i) => kSteps.reduce((sum, step) => sum + times[step][i], 0));
+  const all = Object.fromEntries(kSteps.map((step) => [step, summaryOf(readable(times[step]))]));
+  const by_status = Object.fromEntries(
+    kStatuses.map((name, i) => [name, columns.status.filter((status) => status === i).length]),
+  );
+  const wall_s = (total.reduce((sum, time) => sum + time, 0) / 1000) * 1.1;
+  return {
+    loopbit: "0.1.0",
+    input: { path: "street/images", description: `${frames} images in street/images`, every: 1, limit: 0 },
+    stopped_by: "end",
+    options: {
+      binary_content: { gamma: 1.5, blur_sigma_px: 2.5 },
+      retrieval: { shift_tolerance_columns: kTolerance, top_k: 20, min_similarity: 0.2 },
+      surf: { max_keypoints: 700, upright: true },
+      decision: { min_score: kThreshold },
+    },
+    machine: { processor: "A made-up processor", cores: 2, kernel: "avx2", system: "Linux 6.1.0 x86_64" },
+    threads: 1,
+    counts: { frames, by_status },
+    times_ms: { ...all, total: summaryOf(readable(total)) },
+    wall_s,
+    frames_per_s: frames / wall_s,
+    peak_memory_mib: 180.4,
+  };
+}
+
+/** By contents for few frames, by distance along the street for many. */
+function matrixOf(places, contents) {
+  const frames_per_cell = Math.max(1, Math.ceil(places.length / kMaxSide));
+  const side = Math.ceil(places.length / frames_per_cell);
+  const grey = new Uint8Array(side * side);
+  for (let row = 0; row < side; ++row) {
+    for (let column = 0; column < row; ++column) {
+      const [later, earlier] = [row * frames_per_cell, column * frames_per_cell];
+      const apart = distance_m(places[later].along_m, places[earlier].along_m);
+      const xi = contents
+        ? similarity(contents[later], contents[earlier], kTolerance)
+        : 0.25 + 0.6 * Math.exp(-apart / 2) + 0.05 * Math.sin(later / 50) * Math.cos(earlier / 30);
+      grey[row * side + column] = Math.round(255 * Math.min(1, xi));
+    }
+  }
+  return { side, frames_per_cell, png: pngOf(grey, side, side) };
+}
+
+/** Frames with their partners until `budget` bytes are full, spread over the run. */
+function picturesOf(places, columns, truth, budget) {
+  const pictures = {};
+  let bytes = 0;
+  const add = (frame) => {
+    if (frame < 0 || pictures[frame]) return;
+    const match = columns.match[frame];
+    const picture = evidenceAt(places[frame], match < 0 ? null : places[match]);
+    bytes += Object.values(picture).reduce((sum, text) => sum + (text?.length ?? 0), 70);
+    if (bytes <= budget) pictures[frame] = picture;
+  };
+  for (let i = 0; i < places.length && bytes < budget; ++i) {
+    const frame = (i * 7919) % places.length;
+    if (columns.status[frame] === statusOf("unreadable")) continue;
+    add(frame);
+    add(columns.match[frame]);
+  }
+  for (let i = 0; truth && i < truth.same_place.length && bytes < budget; i += 3) {
+    add(Math.floor((truth.same_place[i + 1] + truth.same_place[i + 2]) / 2));
+  }
+  return pictures;
+}
+
+function runOf(places, index, options) {
+  const next = random(100 + index);
+  const frames = places.length;
+  const isExternal = options.external && index === options.runs - 1;
+  const columns = detect(places, 1 - 0.35 * index, options, next);
+  const truth = options.truth ? truthOf(places) : null;
+  const verdict = verdictsOf(columns, truth);
+  const times_ms = isExternal ? null : timesOf(frames, 1 + 0.4 * index, next);
+  const hasContents = options.pictures && !isExternal;
+  const contents = hasContents && frames <= 400 ? places.map(contentAt) : null;
+  const similarityOf = (match, frame) => {
+    if (match < 0) return 0;
+    return similarity(contentAt(places[frame]), contentAt(places[match]), kTolerance);
+  };
+  const positions = places.map(positionAt);
+  return {
+    name: isExternal ? "another detector" : ["street", "street, fewer keypoints", "street, third"][index],
+    record: isExternal ? null : recordOf(columns, times_ms, frames),
+    threshold: isExternal ? null : kThreshold,
+    frames,
+    timestamp_s: isExternal ? null : places.map((_, i) => round(i * 0.1, 6)),
+    status_names: isExternal ? ["loop", "no_loop"] : kStatuses,
+    status: isExternal ? columns.status.map((status) => (status === 0 ? 0 : 1)) : columns.status,
+    match: columns.match,
+    score: columns.score,
+    similarity: isExternal ? null : columns.match.map((match, frame) => round(similarityOf(match, frame), 6)),
+    matches: isExternal ? null : columns.matches,
+    inliers: isExternal ? null : columns.inliers,
+    times_ms,
+    verdict,
+    truth,
+    evaluation: truth ? evaluationOf(columns, verdict, truth) : null,
+    positions: options.poses
+      ? { x_m: positions.map(({ x }) => round(x, 4)), y_m: positions.map(({ y }) => round(y, 4)) }
+      : null,
+    similarity_matrix: hasContents ? matrixOf(places, contents) : null,
+    pictures: hasContents ? picturesOf(places, columns, truth, (1e6 * options.picturesMb) / options.runs) : {},
+  };
+}
+
+const kDefaults = {
+  frames: 240,
+  runs: 1,
+  truth: true,
+  poses: true,
+  pictures: true,
+  noLoops: false,
+  external: false,
+  unreadable: false,
+  picturesMb: 12,
+};
+
+/** The ReportData of src/report/web/src/report_data.ts. */
+export function sampleData(wanted = {}) {
+  const options = { ...kDefaults, ...wanted };
+  const places = placesOf(options.frames);
+  const runs = Array.from({ length: options.runs }, (_, i) => runOf(places, i, options));
+  return { loopbit: "0.1.0", runs };
+}
+
+/** The page with its data, as src/report/report.cpp puts it in. */
+export function pageWith(page, data) {
+  return page.split("@REPORT_DATA@").join(JSON.stringify(data).replaceAll("<", "\\u003c"));
+}
+
+function main(args) {
+  const flag = (name) => args.includes(name);
+  const value = (name, otherwise) => (flag(name) ? args[args.indexOf(name) + 1] : otherwise);
+  const page = readFileSync(value("--page", "dist/report.html"), "utf8");
+  const data = sampleData({
+    frames: Number(value("--frames", kDefaults.frames)),
+    runs: Number(value("--runs", kDefaults.runs)),
+    truth: !flag("--no-truth"),
+    poses: !flag("--no-poses"),
+    pictures: !flag("--no-pictures"),
+    noLoops: flag("--no-loops"),
+    external: flag("--external"),
+    unreadable: flag("--unreadable"),
+    picturesMb: Number(value("--pictures-mb", kDefaults.picturesMb)),
+  });
+  writeFileSync(value("--out", "sample.html"), pageWith(page, data));
+}
+
+if (import.meta.url === pathToFileURL(process.argv[1]).href) main(process.argv.slice(2));

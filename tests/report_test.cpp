@@ -1,0 +1,154 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/report.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include <nlohmann/json.hpp>
+
+#include "loopbit/evidence_file.hpp"
+#include "loopbit/run_folder.hpp"
+
+#include "test_support.hpp"
+
+namespace loopbit {
+namespace {
+
+using Json = nlohmann::json;
+
+std::string text_of(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+class ReportTest : public test::ScratchTest {
+ protected:
+  /// A run of four frames: nothing, nothing, a right loop, a missed revisit.
+  [[nodiscard]] ReportRun finished_run(const std::string& name) const {
+    const GroundTruth truth{{{2, 0, 0}, {3, 0, 1}}, {}, {}};
+    RunFolder folder(path(name), false);
+    folder.add({.frame = 0});
+    folder.add({.frame = 1, .status = Status::low_score, .match = 0, .score = 4.0});
+    folder.add({.frame = 2,
+                .status = Status::loop,
+                .match = 0,
+                .score = 30.0,
+                .similarity = 0.5,
+                .matches = 40,
+                .inliers = 31,
+                .times = {1.0, 0.25, 8.0, 9.0}});
+    folder.add({.frame = 3, .status = Status::low_score, .match = 0, .score = 11.0});
+    EvidenceWriter evidence(folder.evidence_path());
+    test::Random random;
+    for (int frame = 0; frame < 4; ++frame) {
+      evidence.add(frame, test::view(frame),
+                   {cv::Mat1f(64, 64, 1.0F),
+                    test::random_content(random, 0.2),
+                    {{{0.25F, 0.5F}, {0.75F, 1.0F}}}});
+    }
+    evidence.finish();
+    folder.write_truth(truth);
+    folder.write_positions(
+        {cv::Vec3d(0, 5, 0), cv::Vec3d(0, 5, 9), std::nullopt, cv::Vec3d(1, 5, 0)});
+    RunRecord record;
+    record.input = "<images>";
+    record.score = evaluate(match_list(folder.detections()), truth);
+    folder.finish(record);
+    ReportRun run;
+    run.name = name;
+    run.run = read_run(path(name));
+    run.list = match_list(run.run->detections);
+    run.truth = run.run->truth;
+    run.positions_m = run.run->positions_m;
+    return run;
+  }
+};
+
+TEST_F(ReportTest, SaysWhatTheRunFolderDoes) {
+  const ReportRun run = finished_run("run");
+  const Json json = Json::parse(report_json({run}))["runs"][0];
+  EXPECT_EQ(json["frames"], 4);
+  EXPECT_EQ(json["verdict"], Json::parse(R"(["none", "none", "right", "missed"])"));
+  EXPECT_EQ(json["match"], Json::parse("[-1, 0, 0, 0]"));
+  EXPECT_EQ(json["score"], Json::parse("[0.0, 4.0, 30.0, 11.0]"));
+  EXPECT_EQ(json["status_names"][json["status"][2].get<std::size_t>()], "loop");
+  EXPECT_EQ(json["inliers"][2], 31);
+  EXPECT_EQ(json["times_ms"]["features"][2], 8.0);
+  EXPECT_EQ(json["threshold"], LoopDetectorOptions{}.decision.min_score);
+  EXPECT_EQ(json["evaluation"]["recall"], 0.5);
+  EXPECT_EQ(json["evaluation"]["recall"], json["record"]["score"]["recall"]);
+  EXPECT_EQ(json["record"]["input"]["path"], "<images>");
+  EXPECT_EQ(json["truth"]["same_place"], Json::parse("[2, 0, 0, 3, 0, 1]"));
+}
+
+TEST_F(ReportTest, TheMapIsThePlaneInWhichTheCameraMovedMost) {
+  const Json json = Json::parse(report_json({finished_run("run")}))["runs"][0]["positions"];
+  EXPECT_EQ(json["x_m"], Json::parse("[0.0, 0.0, null, 1.0]"));
+  EXPECT_EQ(json["y_m"], Json::parse("[0.0, 9.0, null, 0.0]"));
+}
+
+TEST_F(ReportTest, PicturesKeepToTheBudget) {
+  const ReportRun run = finished_run("run");
+  const auto pictures = [&](double mb) {
+    return Json::parse(report_json({run}, {.max_pictures_mb = mb}))["runs"][0]["pictures"];
+  };
+  const Json all = pictures(1.0);
+  EXPECT_EQ(all.size(), 4U);
+  EXPECT_TRUE(pictures(0.0).empty());
+  const std::size_t one = all["2"].dump().size();
+  const Json some = pictures(2.5e-6 * static_cast<double>(one));
+  EXPECT_GE(some.size(), 1U);
+  EXPECT_LT(some.size(), 4U);
+  EXPECT_LE(some.dump().size(), 5 * one / 2 + 100);
+}
+
+TEST_F(ReportTest, AnyDetectorsMatchesCanBeShown) {
+  ReportRun run;
+  run.name = "other";
+  run.list = {{{.query = 5, .match = 1, .score = 3.0}, {.query = 5, .match = 2, .score = 4.0}}, {}};
+  const Json json = Json::parse(report_json({run}))["runs"][0];
+  EXPECT_EQ(json["frames"], 6);
+  EXPECT_EQ(json["match"][5], 2);
+  EXPECT_EQ(json["verdict"][5], "loop");
+  EXPECT_EQ(json["verdict"][0], "none");
+  for (const char* name : {"record", "threshold", "similarity", "times_ms", "truth", "evaluation",
+                           "positions", "similarity_matrix"}) {
+    EXPECT_TRUE(json[name].is_null()) << name;
+  }
+}
+
+TEST_F(ReportTest, ThePageHoldsTheDataAndNothingEndsItEarly) {
+  write_report(path("page.html"), {finished_run("</script>")});
+  const std::string page = text_of(path("page.html"));
+  EXPECT_EQ(page.find("@REPORT_DATA@"), std::string::npos);
+  EXPECT_EQ(page.find("</script>\""), std::string::npos);
+  const std::string begin = R"(id="report-data">)";
+  const auto first = page.find(begin) + begin.size();
+  const auto last = page.find("</script>", first);
+  const Json json = Json::parse(page.substr(first, last - first));
+  EXPECT_EQ(json["runs"][0]["name"], "</script>");
+  EXPECT_EQ(json["runs"][0]["record"]["input"]["path"], "<images>");
+}
+
+TEST_F(ReportTest, APageThatCannotBeWrittenIsNamed) {
+  test::expect_error(ErrorKind::output, {path("no/page.html")},
+                     [&] { write_report(path("no/page.html"), {finished_run("run")}); });
+}
+
+TEST_F(ReportTest, ARunThatWasCutOffIsShown) {
+  (void)finished_run("run");
+  std::filesystem::remove(path("run/run.json"));
+  const std::string rows = text_of(path("run/loops.csv"));
+  (void)write("run/loops.csv", rows.substr(0, rows.size() - 5));
+  ReportRun run;
+  run.run = read_run(path("run"));
+  run.list = match_list(run.run->detections);
+  const Json json = Json::parse(report_json({run}))["runs"][0];
+  EXPECT_EQ(json["frames"], 3);
+  EXPECT_TRUE(json["record"].is_null());
+}
+
+}  // namespace
+}  // namespace loopbit
