@@ -6,6 +6,7 @@
 #include <array>
 #include <limits>
 #include <string_view>
+#include <unordered_map>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -61,18 +62,21 @@ std::string verdict_of(int frame, const ReportedMatch* match, const Judge* judge
   return judgement == Judgement::tolerated ? "tolerated" : "none";
 }
 
-/// The true place that stands for all of a query's: the middle of its first run.
-std::optional<int> true_place(const GroundTruth& truth, int query) {
-  const auto run = std::find_if(truth.same_place.begin(), truth.same_place.end(),
-                                [&](const PlaceRun& r) { return r.query == query; });
-  if (run == truth.same_place.end()) return std::nullopt;
-  return run->first + (run->last - run->first) / 2;
+/// Of each query the true place that stands for all: the middle of its first run.
+std::unordered_map<int, int> true_places(const std::optional<GroundTruth>& truth) {
+  std::unordered_map<int, int> places;
+  if (!truth) return places;
+  for (const PlaceRun& run : truth->same_place) {
+    places.try_emplace(run.query, run.first + (run.last - run.first) / 2);
+  }
+  return places;
 }
 
 std::vector<FrameView> frame_views(const ReportRun& run, int frames) {
   const auto judge =
       run.truth ? std::optional<Judge>(std::in_place, *run.truth, run.evaluation) : std::nullopt;
   const auto best = best_matches(run.list, frames);
+  const auto places = true_places(run.truth);
   std::vector<FrameView> views;
   views.reserve(best.size());
   for (int frame = 0; frame < frames; ++frame) {
@@ -80,7 +84,9 @@ std::vector<FrameView> frame_views(const ReportRun& run, int frames) {
     FrameView view{frame, verdict_of(frame, match, judge ? &*judge : nullptr), {}};
     if (match) view.partners.push_back(match->match);
     if (view.verdict == "missed" || view.verdict == "wrong") {
-      if (const auto place = true_place(*run.truth, frame)) view.partners.push_back(*place);
+      if (const auto place = places.find(frame); place != places.end()) {
+        view.partners.push_back(place->second);
+      }
     }
     views.push_back(std::move(view));
   }
