@@ -4,6 +4,7 @@
 #include <immintrin.h>
 
 #include "kernel_variants.hpp"
+#include "surf_loops.hpp"
 
 namespace loopbit {
 namespace {
@@ -69,6 +70,7 @@ void dot_products(const std::int8_t* descriptor, const std::int8_t* descriptors,
 
 }  // namespace
 
-const Kernels kAvx2Kernels{"avx2", max_overlaps<overlap>, dot_products};
+const Kernels kAvx2Kernels{"avx2", max_overlaps<overlap>, dot_products,
+    integral_row, hessian_row, maxima_row, cell_means, describe};
 
 }  // namespace loopbit

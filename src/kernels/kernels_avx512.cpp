@@ -5,6 +5,7 @@
 #include <immintrin.h>
 
 #include "kernel_variants.hpp"
+#include "surf_loops.hpp"
 
 namespace loopbit {
 namespace {
@@ -38,6 +39,7 @@ void dot_products(const std::int8_t* descriptor, const std::int8_t* descriptors,
 
 }  // namespace
 
-const Kernels kAvx512Kernels{"avx512", max_overlaps<overlap>, dot_products};
+const Kernels kAvx512Kernels{"avx512", max_overlaps<overlap>, dot_products,
+    integral_row, hessian_row, maxima_row, cell_means, describe};
 
 }  // namespace loopbit

@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "kernel_variants.hpp"
+#include "surf_loops.hpp"
 
 namespace loopbit {
 namespace {
@@ -25,6 +26,7 @@ void dot_products(const std::int8_t* descriptor, const std::int8_t* descriptors,
 
 }  // namespace
 
-const Kernels kScalarKernels{"scalar", max_overlaps<overlap>, dot_products};
+const Kernels kScalarKernels{"scalar", max_overlaps<overlap>, dot_products,
+    integral_row, hessian_row, maxima_row, cell_means, describe};
 
 }  // namespace loopbit

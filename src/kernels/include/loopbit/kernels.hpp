@@ -14,8 +14,32 @@ inline constexpr std::size_t kContentWords = 64;
 /// 8-bit values in one descriptor.
 inline constexpr std::size_t kDescriptorSize = 64;
 
-/// The two inner loops that decide the speed of loopbit, for one instruction set. All of them
-/// return the same integers; the scalar one is the reference.
+/// What one 8-bit descriptor value counts: a unit-length descriptor has the length 254.
+inline constexpr float kDescriptorScale = 254.0F;
+/// A descriptor is made of 20 x 20 samples, each of which spans 2 x 2 of 21 x 21 cells.
+inline constexpr std::size_t kSamples = 20;
+inline constexpr std::size_t kCells = kSamples + 1;
+/// Cells in memory: rows of 21 and padding.
+inline constexpr std::size_t kCellStride = 24;
+
+/// An integral image whose rows have the even columns first, then the odd ones: corner (row, 2 i) is
+/// corners[row * stride + i], corner (row, 2 i + 1) lies `half` further.
+struct IntegralView {
+  const std::uint32_t* corners = nullptr;
+  std::ptrdiff_t stride = 0;
+  std::ptrdiff_t half = 0;
+};
+
+/// Where the cells of one descriptor meet, for a grid parallel to the image.
+struct CellGrid {
+  const std::uint32_t* rows[kCells + 1];  ///< rows of the integral image
+  std::int32_t columns[kCellStride];      ///< offsets in them; those after kCells + 1 repeat
+  float inverse_heights[kCells];          ///< of the cells, in pixels
+  float inverse_widths[kCellStride];
+};
+
+/// The inner loops that decide the speed of loopbit, for one instruction set. All of them return the
+/// same bits; the scalar one is the reference.
 struct Kernels {
   std::string_view name;
 
@@ -28,6 +52,15 @@ struct Kernels {
   /// products[i] = dot(descriptor, descriptors[i]), each descriptor 64 signed bytes in [-127, 127].
   void (*dot_products)(const std::int8_t* descriptor, const std::int8_t* descriptors,
                        std::size_t num_descriptors, std::int32_t* products);
+
+  void (*integral_row)(const std::uint8_t* pixels, std::size_t width, std::uint32_t* column_sums,
+                       std::uint32_t* even, std::uint32_t* odd);
+  void (*hessian_row)(const IntegralView& integral, std::ptrdiff_t y, std::ptrdiff_t first,
+                      std::ptrdiff_t count, std::ptrdiff_t lobe, float* responses);
+  void (*maxima_row)(const float* const* layers, std::ptrdiff_t stride, std::ptrdiff_t count,
+                     float min_response, std::uint8_t* is_maximum);
+  void (*cell_means)(const CellGrid& grid, float* cells);
+  void (*describe)(const float* cells, std::int8_t* descriptor);
 };
 
 /// The kernels this processor can run, slowest first: "scalar", "avx2", "avx512".

@@ -1,0 +1,164 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "hessian_pyramid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace loopbit {
+namespace {
+
+/// Rows are sampled at every second pixel in all octaves; the coarser ones keep a part.
+constexpr int kRowStep_px = 2;
+
+int round_up(int value, int unit) { return (value + unit - 1) / unit * unit; }
+
+}  // namespace
+
+cv::Rect HessianPyramid::valid_samples(int octave, int interval) const {
+  const int step = step_px(octave);
+  const int reach = (3 * lobe_px(octave, interval) - 1) / 2;
+  const cv::Size size = integral_->size_px();
+  const int first = round_up(reach, step) / step;
+  const int end_x = (size.width - 1 - reach) / step + 1;
+  const int end_y = (size.height - 1 - reach) / step + 1;
+  if (size.width <= 2 * reach || size.height <= 2 * reach) return {};
+  return {first, first, std::max(0, end_x - first), std::max(0, end_y - first)};
+}
+
+void HessianPyramid::build(const IntegralImage& integral, const Kernels& kernels) {
+  integral_ = &integral;
+  const cv::Size size = integral.size_px();
+  row_.resize(static_cast<std::size_t>(size.width / kRowStep_px + 1));
+  for (int o = 0; o < kOctaves; ++o) {
+    const int step = step_px(o);
+    Octave& octave = octaves_[static_cast<std::size_t>(o)];
+    octave.samples = {(size.width - 1) / step + 1, (size.height - 1) / step + 1};
+    for (auto& layer : octave.layers) {
+      layer.resize(static_cast<std::size_t>(octave.samples.area()));
+    }
+    for (int i = 0; i < kIntervals; ++i) {
+      if (o > 0 && i < 2) {
+        take_from_below(o, i);
+      } else {
+        compute(o, i, kernels);
+      }
+    }
+  }
+}
+
+void HessianPyramid::compute(int octave, int interval, const Kernels& kernels) {
+  const cv::Rect valid = valid_samples(octave, interval);
+  if (valid.empty()) return;
+  const int step = step_px(octave);
+  const int part = step / kRowStep_px;
+  const int lobe = lobe_px(octave, interval);
+  Octave& of = octaves_[static_cast<std::size_t>(octave)];
+  float* layer = of.layers[static_cast<std::size_t>(interval)].data();
+  const IntegralView integral = integral_->view();
+  for (int y = valid.y; y < valid.y + valid.height; ++y) {
+    float* out = layer + y * of.samples.width + valid.x;
+    if (part == 1) {
+      kernels.hessian_row(integral, y * step, valid.x, valid.width, lobe, out);
+      continue;
+    }
+    kernels.hessian_row(integral, y * step, valid.x * part, (valid.width - 1) * part + 1, lobe,
+                        row_.data());
+    for (int x = 0; x < valid.width; ++x) out[x] = row_[static_cast<std::size_t>(x * part)];
+  }
+}
+
+void HessianPyramid::take_from_below(int octave, int interval) {
+  const cv::Rect valid = valid_samples(octave, interval);
+  const Octave& below = octaves_[static_cast<std::size_t>(octave - 1)];
+  Octave& of = octaves_[static_cast<std::size_t>(octave)];
+  const float* from = below.layers[static_cast<std::size_t>(2 * interval + 1)].data();
+  float* to = of.layers[static_cast<std::size_t>(interval)].data();
+  for (int y = valid.y; y < valid.y + valid.height; ++y) {
+    for (int x = valid.x; x < valid.x + valid.width; ++x) {
+      to[y * of.samples.width + x] = from[2 * y * below.samples.width + 2 * x];
+    }
+  }
+}
+
+void HessianPyramid::find_maxima(float min_response, const Kernels& kernels,
+                                 std::vector<Maximum>& maxima) {
+  for (int o = 0; o < kOctaves; ++o) {
+    const Octave& octave = octaves_[static_cast<std::size_t>(o)];
+    const std::ptrdiff_t stride = octave.samples.width;
+    for (int i = 1; i + 1 < kIntervals; ++i) {
+      const cv::Rect valid = valid_samples(o, i + 1);
+      const int first = valid.x + 1;
+      const int count = valid.width - 2;
+      if (count <= 0) continue;
+      is_maximum_.assign(static_cast<std::size_t>(round_up(count, 8)), 0);
+      for (int y = valid.y + 1; y < valid.y + valid.height - 1; ++y) {
+        const auto at = [&](int interval) {
+          return octave.layers[static_cast<std::size_t>(interval)].data() + y * stride + first;
+        };
+        const std::array layers = {at(i - 1), at(i), at(i + 1)};
+        kernels.maxima_row(layers.data(), stride, count, min_response, is_maximum_.data());
+        for (int eight = 0; eight < count; eight += 8) {
+          std::uint64_t any = 0;
+          std::memcpy(&any, is_maximum_.data() + eight, sizeof any);
+          if (any == 0) continue;
+          for (int k = eight; k < std::min(count, eight + 8); ++k) {
+            if (is_maximum_[static_cast<std::size_t>(k)] == 0) continue;
+            maxima.push_back({layers[1][k], static_cast<std::uint16_t>(first + k),
+                              static_cast<std::uint16_t>(y), static_cast<std::uint8_t>(o),
+                              static_cast<std::uint8_t>(i)});
+          }
+        }
+      }
+    }
+  }
+}
+
+std::optional<BlobCenter> HessianPyramid::refined(const Maximum& maximum) const {
+  const auto value = [&](int dx, int dy, int di) -> double {
+    return response(maximum.octave, maximum.interval + di, maximum.x + dx, maximum.y + dy);
+  };
+  const double v = value(0, 0, 0);
+  const double gx = (value(1, 0, 0) - value(-1, 0, 0)) / 2;
+  const double gy = (value(0, 1, 0) - value(0, -1, 0)) / 2;
+  const double gs = (value(0, 0, 1) - value(0, 0, -1)) / 2;
+  const double xx = value(1, 0, 0) + value(-1, 0, 0) - 2 * v;
+  const double yy = value(0, 1, 0) + value(0, -1, 0) - 2 * v;
+  const double ss = value(0, 0, 1) + value(0, 0, -1) - 2 * v;
+  const double xy = (value(1, 1, 0) + value(-1, -1, 0) - value(-1, 1, 0) - value(1, -1, 0)) / 4;
+  const double xs = (value(1, 0, 1) + value(-1, 0, -1) - value(-1, 0, 1) - value(1, 0, -1)) / 4;
+  const double ys = (value(0, 1, 1) + value(0, -1, -1) - value(0, -1, 1) - value(0, 1, -1)) / 4;
+  // The offset is -inverse(H) g, by cofactors.
+  const double c_xx = yy * ss - ys * ys;
+  const double c_xy = xs * ys - xy * ss;
+  const double c_xs = xy * ys - xs * yy;
+  const double determinant = xx * c_xx + xy * c_xy + xs * c_xs;
+  if (determinant == 0) return std::nullopt;
+  const double c_yy = xx * ss - xs * xs;
+  const double c_ys = xy * xs - xx * ys;
+  const double c_ss = xx * yy - xy * xy;
+  const double dx = -(c_xx * gx + c_xy * gy + c_xs * gs) / determinant;
+  const double dy = -(c_xy * gx + c_yy * gy + c_ys * gs) / determinant;
+  const double ds = -(c_xs * gx + c_ys * gy + c_ss * gs) / determinant;
+  if (!(std::max({std::abs(dx), std::abs(dy), std::abs(ds)}) < 0.5)) return std::nullopt;
+  const double step = step_px(maximum.octave);
+  const double lobe = step * (maximum.interval + 1 + ds) + 1;
+  return BlobCenter{(maximum.x + dx) * step, (maximum.y + dy) * step, lobe / 3 * 1.2};
+}
+
+bool HessianPyramid::is_bright(const Maximum& maximum) const {
+  const int x = maximum.x * step_px(maximum.octave);
+  const int y = maximum.y * step_px(maximum.octave);
+  const int lobe = lobe_px(maximum.octave, maximum.interval);
+  const int half = (lobe - 1) / 2;
+  const int side = (3 * lobe - 1) / 2;
+  const IntegralImage& in = *integral_;
+  const std::int32_t xx = in.box(x - side, y - lobe + 1, x + side + 1, y + lobe) -
+                          3 * in.box(x - half, y - lobe + 1, x + half + 1, y + lobe);
+  const std::int32_t yy = in.box(x - lobe + 1, y - side, x + lobe, y + side + 1) -
+                          3 * in.box(x - lobe + 1, y - half, x + lobe, y + half + 1);
+  return xx + yy < 0;
+}
+
+}  // namespace loopbit
