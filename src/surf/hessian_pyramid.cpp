@@ -12,7 +12,22 @@ namespace {
 /// Rows are sampled at every second pixel in all octaves; the coarser ones keep a part.
 constexpr int kRowStep_px = 2;
 
+/// Kernels read and write up to so many samples past the end of a row.
+constexpr int kPadding = 16;
+
 int round_up(int value, int unit) { return (value + unit - 1) / unit * unit; }
+
+/// The first x >= `x` that is marked, or one >= `end`. Reads up to 7 bytes past the end.
+int next_marked(const std::uint8_t* marks, int x, int end) {
+  while (x < end) {
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, marks + x, sizeof eight);
+    if (eight != 0) break;
+    x += 8;
+  }
+  while (x < end && marks[x] == 0) ++x;
+  return x;
+}
 
 }  // namespace
 
@@ -30,42 +45,44 @@ cv::Rect HessianPyramid::valid_samples(int octave, int interval) const {
 void HessianPyramid::build(const IntegralImage& integral, const Kernels& kernels) {
   integral_ = &integral;
   const cv::Size size = integral.size_px();
-  row_.resize(static_cast<std::size_t>(size.width / kRowStep_px + 1));
   for (int o = 0; o < kOctaves; ++o) {
     const int step = step_px(o);
     Octave& octave = octaves_[static_cast<std::size_t>(o)];
     octave.samples = {(size.width - 1) / step + 1, (size.height - 1) / step + 1};
+    octave.stride = round_up(octave.samples.width, kPadding) + kPadding;
     for (auto& layer : octave.layers) {
-      layer.resize(static_cast<std::size_t>(octave.samples.area()));
+      layer.resize(static_cast<std::size_t>(octave.stride * octave.samples.height));
     }
-    for (int i = 0; i < kIntervals; ++i) {
-      if (o > 0 && i < 2) {
-        take_from_below(o, i);
-      } else {
-        compute(o, i, kernels);
-      }
+    const int tile = static_cast<int>(kHessianRun) * kRowStep_px / step;
+    const int first_new = o == 0 ? 0 : 2;
+    for (int i = 0; i < first_new; ++i) take_from_below(o, i);
+    for (int begin = 0; begin < octave.samples.width; begin += tile) {
+      compute({begin, 0, tile, octave.samples.height}, o, first_new, kernels);
     }
   }
 }
 
-void HessianPyramid::compute(int octave, int interval, const Kernels& kernels) {
-  const cv::Rect valid = valid_samples(octave, interval);
-  if (valid.empty()) return;
+void HessianPyramid::compute(const cv::Rect& tile, int octave, int first_interval,
+                             const Kernels& kernels) {
   const int step = step_px(octave);
   const int part = step / kRowStep_px;
-  const int lobe = lobe_px(octave, interval);
   Octave& of = octaves_[static_cast<std::size_t>(octave)];
-  float* layer = of.layers[static_cast<std::size_t>(interval)].data();
   const IntegralView integral = integral_->view();
-  for (int y = valid.y; y < valid.y + valid.height; ++y) {
-    float* out = layer + y * of.samples.width + valid.x;
-    if (part == 1) {
-      kernels.hessian_row(integral, y * step, valid.x, valid.width, lobe, out);
-      continue;
+  const int count = std::min(tile.width, of.samples.width - tile.x);
+  for (int y = 0; y < tile.height; ++y) {
+    for (int i = first_interval; i < kIntervals; ++i) {
+      const int reach = (3 * lobe_px(octave, i) - 1) / 2;
+      if (y * step < reach || y * step + reach >= integral_->size_px().height) continue;
+      float* out = of.layers[static_cast<std::size_t>(i)].data() + y * of.stride + tile.x;
+      if (part == 1) {
+        kernels.hessian_row(integral, y * step, tile.x, count, lobe_px(octave, i), out);
+        continue;
+      }
+      std::array<float, kHessianRun> responses;
+      kernels.hessian_row(integral, y * step, tile.x * part, (count - 1) * part + 1,
+                          lobe_px(octave, i), responses.data());
+      for (int x = 0; x < count; ++x) out[x] = responses[static_cast<std::size_t>(x * part)];
     }
-    kernels.hessian_row(integral, y * step, valid.x * part, (valid.width - 1) * part + 1, lobe,
-                        row_.data());
-    for (int x = 0; x < valid.width; ++x) out[x] = row_[static_cast<std::size_t>(x * part)];
   }
 }
 
@@ -77,7 +94,7 @@ void HessianPyramid::take_from_below(int octave, int interval) {
   float* to = of.layers[static_cast<std::size_t>(interval)].data();
   for (int y = valid.y; y < valid.y + valid.height; ++y) {
     for (int x = valid.x; x < valid.x + valid.width; ++x) {
-      to[y * of.samples.width + x] = from[2 * y * below.samples.width + 2 * x];
+      to[y * of.stride + x] = from[2 * y * below.stride + 2 * x];
     }
   }
 }
@@ -86,29 +103,21 @@ void HessianPyramid::find_maxima(float min_response, const Kernels& kernels,
                                  std::vector<Maximum>& maxima) {
   for (int o = 0; o < kOctaves; ++o) {
     const Octave& octave = octaves_[static_cast<std::size_t>(o)];
-    const std::ptrdiff_t stride = octave.samples.width;
+    is_maximum_.resize(static_cast<std::size_t>(octave.stride));
     for (int i = 1; i + 1 < kIntervals; ++i) {
+      // All 26 neighbours must be valid, and the layer above has the widest filter.
       const cv::Rect valid = valid_samples(o, i + 1);
       const int first = valid.x + 1;
-      const int count = valid.width - 2;
-      if (count <= 0) continue;
-      is_maximum_.assign(static_cast<std::size_t>(round_up(count, 8)), 0);
+      const int end = valid.x + valid.width - 1;
       for (int y = valid.y + 1; y < valid.y + valid.height - 1; ++y) {
-        const auto at = [&](int interval) {
-          return octave.layers[static_cast<std::size_t>(interval)].data() + y * stride + first;
-        };
-        const std::array layers = {at(i - 1), at(i), at(i + 1)};
-        kernels.maxima_row(layers.data(), stride, count, min_response, is_maximum_.data());
-        for (int eight = 0; eight < count; eight += 8) {
-          std::uint64_t any = 0;
-          std::memcpy(&any, is_maximum_.data() + eight, sizeof any);
-          if (any == 0) continue;
-          for (int k = eight; k < std::min(count, eight + 8); ++k) {
-            if (is_maximum_[static_cast<std::size_t>(k)] == 0) continue;
-            maxima.push_back({layers[1][k], static_cast<std::uint16_t>(first + k),
-                              static_cast<std::uint16_t>(y), static_cast<std::uint8_t>(o),
-                              static_cast<std::uint8_t>(i)});
-          }
+        const std::array layers = {octave.row(i - 1, y), octave.row(i, y), octave.row(i + 1, y)};
+        kernels.maxima_row(layers.data(), octave.stride, octave.samples.width, min_response,
+                           is_maximum_.data());
+        for (int x = next_marked(is_maximum_.data(), first, end); x < end;
+             x = next_marked(is_maximum_.data(), x + 1, end)) {
+          maxima.push_back({layers[1][x], static_cast<std::uint16_t>(x),
+                            static_cast<std::uint16_t>(y), static_cast<std::uint8_t>(o),
+                            static_cast<std::uint8_t>(i)});
         }
       }
     }

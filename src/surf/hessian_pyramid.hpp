@@ -57,9 +57,7 @@ class HessianPyramid {
   [[nodiscard]] bool is_bright(const Maximum& maximum) const;
 
   [[nodiscard]] float response(int octave, int interval, int x, int y) const {
-    const Octave& of = octaves_[static_cast<std::size_t>(octave)];
-    return of.layers[static_cast<std::size_t>(interval)][static_cast<std::size_t>(
-        y * of.samples.width + x)];
+    return octaves_[static_cast<std::size_t>(octave)].row(interval, y)[x];
   }
 
   /// The samples at which a layer's filter lies within the image.
@@ -68,15 +66,19 @@ class HessianPyramid {
  private:
   struct Octave {
     cv::Size samples;
+    int stride = 0;
     std::array<std::vector<float>, kIntervals> layers;
+
+    [[nodiscard]] const float* row(int interval, int y) const {
+      return layers[static_cast<std::size_t>(interval)].data() + y * stride;
+    }
   };
 
-  void compute(int octave, int interval, const Kernels& kernels);
+  void compute(const cv::Rect& tile, int octave, int first_interval, const Kernels& kernels);
   void take_from_below(int octave, int interval);
 
   const IntegralImage* integral_ = nullptr;
   std::array<Octave, kOctaves> octaves_;
-  std::vector<float> row_;
   std::vector<std::uint8_t> is_maximum_;
 };
 

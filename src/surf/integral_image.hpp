@@ -20,10 +20,10 @@ class IntegralImage {
   void load(const cv::Mat1b& gray, const Kernels& kernels);
 
   [[nodiscard]] cv::Size size_px() const { return size_px_; }
-  [[nodiscard]] IntegralView view() const { return {corners_.data(), stride_, stride_ / 2}; }
+  [[nodiscard]] IntegralView view() const { return {corners_, stride_, stride_ / 2}; }
 
   /// 0 <= y <= height: the corners above pixel row y.
-  [[nodiscard]] const std::uint32_t* row(int y) const { return corners_.data() + y * stride_; }
+  [[nodiscard]] const std::uint32_t* row(int y) const { return corners_ + y * stride_; }
   /// 0 <= x <= width: where a row has the corner left of pixel x.
   [[nodiscard]] std::ptrdiff_t column(int x) const { return x / 2 + (x & 1) * (stride_ / 2); }
   /// The sum over the pixels x0 <= x < x1, y0 <= y < y1.
@@ -35,7 +35,8 @@ class IntegralImage {
  private:
   cv::Size size_px_;
   std::ptrdiff_t stride_ = 0;
-  std::vector<std::uint32_t> corners_;
+  std::vector<std::uint32_t> memory_;
+  std::uint32_t* corners_ = nullptr;
   std::vector<std::uint32_t> column_sums_;
 };
 

@@ -34,7 +34,7 @@ void upright_patch(const IntegralImage& integral, const Keypoint& keypoint, cons
     grid.inverse_widths[i] = inverse(xs[i + 1] - xs[i]);
   }
   for (std::size_t i = 0; i <= kCells; ++i) grid.rows[i] = integral.row(ys[i]);
-  for (std::size_t i = 0; i < kCellStride; ++i) {
+  for (std::size_t i = 0; i <= kCellStride; ++i) {
     grid.columns[i] = static_cast<std::int32_t>(integral.column(xs[std::min(i, kCells)]));
   }
   kernels.cell_means(grid, patch.data());

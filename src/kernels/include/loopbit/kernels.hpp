@@ -22,6 +22,9 @@ inline constexpr std::size_t kCells = kSamples + 1;
 /// Cells in memory: rows of 21 and padding.
 inline constexpr std::size_t kCellStride = 24;
 
+/// Hessian responses are computed in runs of at most so many samples.
+inline constexpr std::ptrdiff_t kHessianRun = 128;
+
 /// An integral image whose rows have the even columns first, then the odd ones: corner (row, 2 i) is
 /// corners[row * stride + i], corner (row, 2 i + 1) lies `half` further.
 struct IntegralView {
@@ -33,7 +36,7 @@ struct IntegralView {
 /// Where the cells of one descriptor meet, for a grid parallel to the image.
 struct CellGrid {
   const std::uint32_t* rows[kCells + 1];  ///< rows of the integral image
-  std::int32_t columns[kCellStride];      ///< offsets in them; those after kCells + 1 repeat
+  std::int32_t columns[kCellStride + 1];  ///< offsets in them; those after kCells + 1 repeat
   float inverse_heights[kCells];          ///< of the cells, in pixels
   float inverse_widths[kCellStride];
 };
