@@ -12,6 +12,8 @@
 
 #include "loopbit/kernels.hpp"
 
+#include "feature_matcher.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -19,66 +21,6 @@ namespace {
 constexpr std::size_t kMinMatchesForGeometry = 8;
 constexpr int kRansacIterations = 1000;
 constexpr double kRansacConfidence = 0.999;
-
-/// The nearest and second nearest neighbour of a feature, by squared distance.
-struct Nearest {
-  std::size_t index = 0;
-  std::int32_t distance_sq = std::numeric_limits<std::int32_t>::max();
-  std::int32_t second_distance_sq = std::numeric_limits<std::int32_t>::max();
-
-  void offer(std::size_t other, std::int32_t other_distance_sq) {
-    if (other_distance_sq < distance_sq) {
-      second_distance_sq = distance_sq;
-      distance_sq = other_distance_sq;
-      index = other;
-    } else if (other_distance_sq < second_distance_sq) {
-      second_distance_sq = other_distance_sq;
-    }
-  }
-
-  [[nodiscard]] bool is_distinct(double max_ratio) const {
-    return distance_sq < max_ratio * max_ratio * second_distance_sq;
-  }
-};
-
-std::vector<std::int32_t> squared_norms(std::span<const Descriptor> descriptors) {
-  std::vector<std::int32_t> norms;
-  norms.reserve(descriptors.size());
-  for (const Descriptor& d : descriptors) {
-    std::int32_t norm = 0;
-    active_kernels().dot_products(d.data(), d.data(), 1, &norm);
-    norms.push_back(norm);
-  }
-  return norms;
-}
-
-/// Appends the distinct mutual matches between two groups of descriptors, whose first members have
-/// the indices `first_query` and `first_place`.
-void match_group(std::span<const Descriptor> query, std::size_t first_query,
-                 std::span<const Descriptor> place, std::size_t first_place, double max_ratio,
-                 std::vector<Match>& matches) {
-  if (query.empty() || place.empty()) return;
-  const auto query_norms = squared_norms(query);
-  const auto place_norms = squared_norms(place);
-  std::vector<Nearest> of_query(query.size());
-  std::vector<Nearest> of_place(place.size());
-  std::vector<std::int32_t> products(place.size());
-  for (std::size_t q = 0; q < query.size(); ++q) {
-    active_kernels().dot_products(query[q].data(), place.front().data(), place.size(),
-                                  products.data());
-    for (std::size_t p = 0; p < place.size(); ++p) {
-      const std::int32_t distance_sq = query_norms[q] + place_norms[p] - 2 * products[p];
-      of_query[q].offer(p, distance_sq);
-      of_place[p].offer(q, distance_sq);
-    }
-  }
-  for (std::size_t q = 0; q < query.size(); ++q) {
-    const std::size_t p = of_query[q].index;
-    if (of_place[p].index != q) continue;
-    if (!of_query[q].is_distinct(max_ratio) || !of_place[p].is_distinct(max_ratio)) continue;
-    matches.push_back({static_cast<int>(first_query + q), static_cast<int>(first_place + p)});
-  }
-}
 
 const Keypoint& keypoint(const Features& features, int index) {
   return features.keypoints[static_cast<std::size_t>(index)];
@@ -131,14 +73,8 @@ bool overlap(const Keypoint& a, const Keypoint& b, double min_spacing_scales) {
 }  // namespace
 
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio) {
-  static_assert(sizeof(Descriptor) == kDescriptorSize);
-  const std::span<const Descriptor> of_query = query.descriptors;
-  const std::span<const Descriptor> of_place = place.descriptors;
   std::vector<Match> matches;
-  match_group(of_query.first(query.num_dark), 0, of_place.first(place.num_dark), 0, max_ratio,
-              matches);
-  match_group(of_query.subspan(query.num_dark), query.num_dark, of_place.subspan(place.num_dark),
-              place.num_dark, max_ratio, matches);
+  FeatureMatcher(active_kernels()).match(query, place, max_ratio, matches);
   return matches;
 }
 

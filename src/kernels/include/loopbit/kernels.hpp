@@ -41,6 +41,18 @@ struct CellGrid {
   float inverse_widths[kCellStride];
 };
 
+/// Descriptors whose neighbours are sought at once.
+inline constexpr std::size_t kMatchLanes = 16;
+
+/// The neighbours of kMatchLanes descriptors by squared distance; of equals, the first is nearest.
+struct NearestTwo {
+  static constexpr std::int32_t kNone = 0x7fffffff;
+
+  alignas(64) std::int32_t index[kMatchLanes];
+  alignas(64) std::int32_t distance_sq[kMatchLanes];         ///< kNone if there is no other
+  alignas(64) std::int32_t second_distance_sq[kMatchLanes];  ///< kNone if there is only one
+};
+
 /// The inner loops that decide the speed of loopbit, for one instruction set. All of them return the
 /// same bits; the scalar one is the reference.
 struct Kernels {
@@ -52,9 +64,14 @@ struct Kernels {
                        const std::uint64_t* places, std::size_t num_places,
                        std::uint16_t* overlaps);
 
-  /// products[i] = dot(descriptor, descriptors[i]), each descriptor 64 signed bytes in [-127, 127].
-  void (*dot_products)(const std::int8_t* descriptor, const std::int8_t* descriptors,
-                       std::size_t num_descriptors, std::int32_t* products);
+  /// constants[i] = what this variant's nearest_two has to know of the i-th descriptor.
+  void (*describe_constants)(const std::int8_t* descriptors, std::size_t num_descriptors,
+                             std::int32_t* constants);
+
+  /// The nearest and second nearest of `others` for each of 16 descriptors. `constants` belong to
+  /// `others`. Cost: 16 * num_others products of 64 values.
+  void (*nearest_two)(const std::int8_t* descriptors, const std::int8_t* others,
+                      const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest);
 
   void (*integral_row)(const std::uint8_t* pixels, std::size_t width, std::uint32_t* column_sums,
                        std::uint32_t* even, std::uint32_t* odd);

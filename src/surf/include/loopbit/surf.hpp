@@ -38,7 +38,7 @@ struct Features {
 
 struct SurfOptions {
   int working_side_px = 640;
-  int max_keypoints = 700;
+  int max_keypoints = 600;
   bool upright = true;
 
   static constexpr auto fields() {
