@@ -12,6 +12,7 @@
 
 #include "loopbit/kernels.hpp"
 
+#include "epipolar_ransac.hpp"
 #include "feature_matcher.hpp"
 
 namespace loopbit {
@@ -19,34 +20,25 @@ namespace {
 
 /// Seven matches always have an epipolar geometry, so only more can speak for one.
 constexpr std::size_t kMinMatchesForGeometry = 8;
-constexpr int kRansacIterations = 1000;
-constexpr double kRansacConfidence = 0.999;
 
 const Keypoint& keypoint(const Features& features, int index) {
   return features.keypoints[static_cast<std::size_t>(index)];
 }
 
-std::vector<cv::Point2f> positions(const Features& features, const std::vector<Match>& matches,
-                                   int Match::*side) {
-  std::vector<cv::Point2f> points;
-  points.reserve(matches.size());
-  for (const Match& match : matches) {
-    const Keypoint& point = keypoint(features, match.*side);
-    points.emplace_back(point.x_px, point.y_px);
-  }
-  return points;
-}
-
 std::vector<Match> ransac_inliers(const Features& query, const Features& place,
                                   const std::vector<Match>& matches, double max_error_px) {
-  std::vector<std::uint8_t> is_inlier;
-  // MAGSAC++ (Barath et al., CVPR 2020); OpenCV seeds it with the same constant at every call.
-  cv::findFundamentalMat(positions(query, matches, &Match::query),
-                         positions(place, matches, &Match::place), cv::USAC_MAGSAC, max_error_px,
-                         kRansacConfidence, kRansacIterations, is_inlier);
+  std::vector<EpipolarRansac::Pair> pairs;
+  pairs.reserve(matches.size());
+  for (const Match& match : matches) {
+    const Keypoint& a = keypoint(query, match.query);
+    const Keypoint& b = keypoint(place, match.place);
+    pairs.push_back({a.x_px, a.y_px, b.x_px, b.y_px});
+  }
+  EpipolarRansac ransac;
+  ransac.find(pairs, max_error_px);
   std::vector<Match> inliers;
-  for (std::size_t i = 0; i < is_inlier.size(); ++i) {
-    if (is_inlier[i] != 0) inliers.push_back(matches[i]);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (ransac.is_inlier()[i] != 0) inliers.push_back(matches[i]);
   }
   return inliers;
 }
