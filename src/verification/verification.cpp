@@ -4,11 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <limits>
-#include <span>
-
-#include <opencv2/calib3d.hpp>
 
 #include "loopbit/kernels.hpp"
 
@@ -25,34 +20,14 @@ const Keypoint& keypoint(const Features& features, int index) {
   return features.keypoints[static_cast<std::size_t>(index)];
 }
 
-std::vector<Match> ransac_inliers(const Features& query, const Features& place,
-                                  const std::vector<Match>& matches, double max_error_px) {
-  std::vector<EpipolarRansac::Pair> pairs;
-  pairs.reserve(matches.size());
-  for (const Match& match : matches) {
-    const Keypoint& a = keypoint(query, match.query);
-    const Keypoint& b = keypoint(place, match.place);
-    pairs.push_back({a.x_px, a.y_px, b.x_px, b.y_px});
-  }
-  EpipolarRansac ransac;
-  ransac.find(pairs, max_error_px);
-  std::vector<Match> inliers;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    if (ransac.is_inlier()[i] != 0) inliers.push_back(matches[i]);
-  }
-  return inliers;
+EpipolarRansac::Pair pair_of(const Features& query, const Features& place, const Match& match) {
+  const Keypoint& a = keypoint(query, match.query);
+  const Keypoint& b = keypoint(place, match.place);
+  return {a.x_px, a.y_px, b.x_px, b.y_px};
 }
 
-/// The matches that a camera standing where it stood would see: a geometry, too, but one that no
-/// fundamental matrix is determined by, so that RANSAC finds none.
-std::vector<Match> unmoved_matches(const Features& query, const Features& place,
-                                   std::vector<Match> matches, double max_error_px) {
-  std::erase_if(matches, [&](const Match& match) {
-    const Keypoint& a = keypoint(query, match.query);
-    const Keypoint& b = keypoint(place, match.place);
-    return std::hypot(a.x_px - b.x_px, a.y_px - b.y_px) > max_error_px;
-  });
-  return matches;
+float moved_px(const EpipolarRansac::Pair& pair) {
+  return std::hypot(pair.x1 - pair.x0, pair.y1 - pair.y0);
 }
 
 bool overlap(const Keypoint& a, const Keypoint& b, double min_spacing_scales) {
@@ -62,7 +37,92 @@ bool overlap(const Keypoint& a, const Keypoint& b, double min_spacing_scales) {
   return dx * dx + dy * dy < spacing * spacing;
 }
 
+/// What matches say about two views; keeps its memory from pair to pair.
+class Geometry {
+ public:
+  void find_inliers(const Features& query, const Features& place, std::span<const Match> matches,
+                    double max_error_px, std::vector<Match>& inliers) {
+    inliers.clear();
+    if (matches.size() < kMinMatchesForGeometry) return;
+    pairs_.clear();
+    for (const Match& match : matches) pairs_.push_back(pair_of(query, place, match));
+    // A camera standing where it stood has a geometry, too, but one that no fundamental matrix is
+    // determined by, so that RANSAC may find none.
+    const auto is_unmoved = [&](const auto& pair) { return moved_px(pair) <= max_error_px; };
+    const auto unmoved = std::count_if(pairs_.begin(), pairs_.end(), is_unmoved);
+    const bool has_moved = ransac_.find(pairs_, max_error_px) >= unmoved;
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (has_moved ? ransac_.is_inlier()[i] != 0 : is_unmoved(pairs_[i])) {
+        inliers.push_back(matches[i]);
+      }
+    }
+  }
+
+  int count_distinct(const Features& query, const Features& place, std::span<const Match> inliers,
+                     double min_spacing_scales) {
+    const auto repeats = [&](const Match& a, const Match& b) {
+      return overlap(keypoint(query, a.query), keypoint(query, b.query), min_spacing_scales) ||
+             overlap(keypoint(place, a.place), keypoint(place, b.place), min_spacing_scales);
+    };
+    distinct_.clear();
+    for (const Match& match : inliers) {
+      const bool is_new = std::none_of(distinct_.begin(), distinct_.end(),
+                                       [&](const Match& other) { return repeats(match, other); });
+      if (is_new) distinct_.push_back(match);
+    }
+    return static_cast<int>(distinct_.size());
+  }
+
+ private:
+  EpipolarRansac ransac_;
+  std::vector<EpipolarRansac::Pair> pairs_;
+  std::vector<Match> distinct_;
+};
+
 }  // namespace
+
+class Verifier::Impl {
+ public:
+  Impl(const VerificationOptions& options, const Kernels& kernels)
+      : options_(options), matcher_(kernels) {
+    validate(options, "verification");
+  }
+
+  void match(const Features& query, const Features& place, Verification& result) {
+    matcher_.match(query, place, options_.max_ratio, result.matches);
+    result.inliers.clear();
+    result.distinct_inliers = 0;
+  }
+
+  void find_geometry(const Features& query, const Features& place, Verification& result) {
+    result.inliers.clear();
+    result.distinct_inliers = 0;
+    if (result.matches.size() < static_cast<std::size_t>(options_.min_matches)) return;
+    geometry_.find_inliers(query, place, result.matches, options_.max_epipolar_error_px,
+                           result.inliers);
+    result.distinct_inliers =
+        geometry_.count_distinct(query, place, result.inliers, options_.min_spacing_scales);
+  }
+
+ private:
+  VerificationOptions options_;
+  FeatureMatcher matcher_;
+  Geometry geometry_;
+};
+
+Verifier::Verifier(const VerificationOptions& options, const Kernels& kernels)
+    : impl_(std::make_unique<Impl>(options, kernels)) {}
+Verifier::~Verifier() = default;
+Verifier::Verifier(Verifier&&) noexcept = default;
+Verifier& Verifier::operator=(Verifier&&) noexcept = default;
+
+void Verifier::match(const Features& query, const Features& place, Verification& result) {
+  impl_->match(query, place, result);
+}
+
+void Verifier::find_geometry(const Features& query, const Features& place, Verification& result) {
+  impl_->find_geometry(query, place, result);
+}
 
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio) {
   std::vector<Match> matches;
@@ -72,36 +132,22 @@ std::vector<Match> match_features(const Features& query, const Features& place, 
 
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
                                     const std::vector<Match>& matches, double max_error_px) {
-  if (matches.size() < kMinMatchesForGeometry) return {};
-  auto moved = ransac_inliers(query, place, matches, max_error_px);
-  auto unmoved = unmoved_matches(query, place, matches, max_error_px);
-  return unmoved.size() > moved.size() ? unmoved : moved;
+  std::vector<Match> inliers;
+  Geometry().find_inliers(query, place, matches, max_error_px, inliers);
+  return inliers;
 }
 
 int distinct_inliers(const Features& query, const Features& place,
                      const std::vector<Match>& inliers, double min_spacing_scales) {
-  const auto repeats = [&](const Match& a, const Match& b) {
-    return overlap(keypoint(query, a.query), keypoint(query, b.query), min_spacing_scales) ||
-           overlap(keypoint(place, a.place), keypoint(place, b.place), min_spacing_scales);
-  };
-  std::vector<Match> distinct;
-  for (const Match& match : inliers) {
-    const bool is_new = std::none_of(distinct.begin(), distinct.end(),
-                                     [&](const Match& other) { return repeats(match, other); });
-    if (is_new) distinct.push_back(match);
-  }
-  return static_cast<int>(distinct.size());
+  return Geometry().count_distinct(query, place, inliers, min_spacing_scales);
 }
 
 Verification verify(const Features& query, const Features& place,
                     const VerificationOptions& options) {
-  validate(options, "verification");
+  Verifier verifier(options);
   Verification result;
-  result.matches = match_features(query, place, options.max_ratio);
-  if (result.matches.size() < static_cast<std::size_t>(options.min_matches)) return result;
-  result.inliers = epipolar_inliers(query, place, result.matches, options.max_epipolar_error_px);
-  result.distinct_inliers =
-      distinct_inliers(query, place, result.inliers, options.min_spacing_scales);
+  verifier.match(query, place, result);
+  verifier.find_geometry(query, place, result);
   return result;
 }
 
