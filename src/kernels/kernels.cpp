@@ -23,8 +23,7 @@ std::vector<const Kernels*> kernels_of_this_processor() {
   const bool has_avx512 =
       __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
       __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
-      __builtin_cpu_supports("avx512vnni") != 0 &&
-      __builtin_cpu_supports("avx512vpopcntdq") != 0;
+      __builtin_cpu_supports("avx512vnni") != 0 && __builtin_cpu_supports("avx512vpopcntdq") != 0;
   if (has_avx512) kernels.push_back(&kAvx512Kernels);
 #endif
   return kernels;

@@ -111,8 +111,8 @@ void offer_products(const Lanes& lanes, const std::int8_t* others, const std::in
     for (std::size_t i = 0; i < Count; ++i) {
       std::int32_t chunk;
       __builtin_memcpy(&chunk, others + i * kDescriptorSize + 4 * c, sizeof chunk);
-      sums[i] = _mm256_add_epi32(sums[i], products_of_4(lanes.magnitudes[c], lanes.bytes[c],
-                                                        _mm256_set1_epi32(chunk)));
+      sums[i] = _mm256_add_epi32(
+          sums[i], products_of_4(lanes.magnitudes[c], lanes.bytes[c], _mm256_set1_epi32(chunk)));
     }
   }
   for (std::size_t i = 0; i < Count; ++i) {
@@ -156,7 +156,8 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
 
 }  // namespace
 
-const Kernels kAvx2Kernels{"avx2", max_overlaps<overlap>, describe_constants, nearest_two,
-    integral_row, hessian_row, maxima_row, cell_means, describe};
+const Kernels kAvx2Kernels{"avx2",       max_overlaps<overlap>, describe_constants, nearest_two,
+                           integral_row, hessian_row,           maxima_row,         cell_means,
+                           describe};
 
 }  // namespace loopbit

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-// Compiled with AVX-512 F, BW, DQ, VL, VNNI and VPOPCNTDQ: nothing here may run before the processor
-// was asked.
+// Compiled with AVX-512 F, BW, DQ, VL, VNNI and VPOPCNTDQ: nothing here may run before the
+// processor was asked.
 #include <immintrin.h>
 
 #include "kernel_variants.hpp"
@@ -36,9 +36,8 @@ void describe_constants(const std::int8_t* descriptors, std::size_t num_descript
   for (std::size_t i = 0; i < num_descriptors; ++i) {
     const __m512i p = _mm512_loadu_si512(descriptors + i * kDescriptorSize);
     // (p + 128) p + 128 p
-    const __m512i sums =
-        _mm512_dpbusd_epi32(_mm512_dpbusd_epi32(_mm512_setzero_si512(), raised(p), p),
-                            _mm512_set1_epi8(-128), p);
+    const __m512i sums = _mm512_dpbusd_epi32(
+        _mm512_dpbusd_epi32(_mm512_setzero_si512(), raised(p), p), _mm512_set1_epi8(-128), p);
     constants[i] = _mm512_reduce_add_epi32(sums);
   }
 }
@@ -80,8 +79,7 @@ void offer_products(const __m512i (&lanes)[kChunks], const std::int8_t* others,
     for (std::size_t i = 0; i < Count; ++i) {
       const std::int8_t* other = others + i * kDescriptorSize;
       low[i] = _mm512_dpbusd_epi32(low[i], lanes[c], chunk(other, c));
-      high[i] =
-          _mm512_dpbusd_epi32(high[i], lanes[c + kChunks / 2], chunk(other, c + kChunks / 2));
+      high[i] = _mm512_dpbusd_epi32(high[i], lanes[c + kChunks / 2], chunk(other, c + kChunks / 2));
     }
   }
   for (std::size_t i = 0; i < Count; ++i) {
@@ -92,9 +90,9 @@ void offer_products(const __m512i (&lanes)[kChunks], const std::int8_t* others,
 
 void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
                  const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest) {
-  const __m512i first_bytes = _mm512_mullo_epi32(
-      _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
-      _mm512_set1_epi32(static_cast<int>(kDescriptorSize)));
+  const __m512i first_bytes =
+      _mm512_mullo_epi32(_mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
+                         _mm512_set1_epi32(static_cast<int>(kDescriptorSize)));
   __m512i lanes[kChunks];
   __m512i squares = _mm512_setzero_si512();
   __m512i sums = _mm512_setzero_si512();
@@ -128,7 +126,8 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
 
 }  // namespace
 
-const Kernels kAvx512Kernels{"avx512", max_overlaps<overlap>, describe_constants, nearest_two,
-    integral_row, hessian_row, maxima_row, cell_means, describe};
+const Kernels kAvx512Kernels{"avx512",     max_overlaps<overlap>, describe_constants, nearest_two,
+                             integral_row, hessian_row,           maxima_row,         cell_means,
+                             describe};
 
 }  // namespace loopbit

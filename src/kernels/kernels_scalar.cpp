@@ -55,7 +55,8 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
 
 }  // namespace
 
-const Kernels kScalarKernels{"scalar", max_overlaps<overlap>, describe_constants, nearest_two,
-    integral_row, hessian_row, maxima_row, cell_means, describe};
+const Kernels kScalarKernels{"scalar",     max_overlaps<overlap>, describe_constants, nearest_two,
+                             integral_row, hessian_row,           maxima_row,         cell_means,
+                             describe};
 
 }  // namespace loopbit

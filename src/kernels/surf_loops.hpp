@@ -131,8 +131,8 @@ void hessian_row(const IntegralView& integral, std::ptrdiff_t y, std::ptrdiff_t 
     const FilterRows rows(
         integral.corners + y * integral.stride + parity * integral.half + first - kRunMargin,
         integral.stride, lobe);
-    make_bands(rows, kRunMargin - reach, kRunMargin + whole_blocks(count) + reach,
-               bands.xx[parity], bands.yy[parity], bands.xy[parity]);
+    make_bands(rows, kRunMargin - reach, kRunMargin + whole_blocks(count) + reach, bands.xx[parity],
+               bands.yy[parity], bands.xy[parity]);
   }
   combine_bands(bands, count, lobe, responses);
 }
@@ -190,8 +190,8 @@ void cell_means(const CellGrid& grid, float* __restrict cells) {
     const std::uint32_t* lower = corners[i + 1];
     for (std::size_t k = 0; k < kCellStride; ++k) {
       const std::uint32_t sum = lower[k + 1] - lower[k] - upper[k + 1] + upper[k];
-      cells[i * kCellStride + k] = static_cast<float>(as_signed(sum)) *
-                                   (grid.inverse_heights[i] * grid.inverse_widths[k]);
+      cells[i * kCellStride + k] =
+          static_cast<float>(as_signed(sum)) * (grid.inverse_heights[i] * grid.inverse_widths[k]);
     }
   }
 }
@@ -242,8 +242,8 @@ void quantize(const float* values, std::int8_t* descriptor) {
   for (std::size_t i = 0; i < kDescriptorSize; ++i) {
     float value = values[i] * factor;
     value = value > 127.0F ? 127.0F : (value < -127.0F ? -127.0F : value);
-    descriptor[i] = static_cast<std::int8_t>(
-        static_cast<std::int32_t>(value + (value < 0.0F ? -0.5F : 0.5F)));
+    descriptor[i] =
+        static_cast<std::int8_t>(static_cast<std::int32_t>(value + (value < 0.0F ? -0.5F : 0.5F)));
   }
 }
 

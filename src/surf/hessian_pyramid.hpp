@@ -30,9 +30,9 @@ struct BlobCenter {
   double scale = 0;  ///< 1 = a 9 x 9 box filter
 };
 
-/// The determinant of the Hessian by box filters: 4 octaves of 4 intervals, sampled at every 2, 4, 8
-/// and 16 pixels (Bay et al. 2008, section 3). The lobe of interval i in octave o is
-/// 2^(o+1) (i+1) + 1 px wide, so an octave's first two intervals are samples of the octave below.
+/// The determinant of the Hessian by box filters: 4 octaves of 4 intervals, sampled at every 2, 4,
+/// 8 and 16 pixels (Bay et al. 2008, section 3). The lobe of interval i in octave o is 2^(o+1)
+/// (i+1) + 1 px wide, so an octave's first two intervals are samples of the octave below.
 class HessianPyramid {
  public:
   static constexpr int kOctaves = 4;

@@ -79,15 +79,14 @@ float dominant_angle(const IntegralImage& integral, const Keypoint& keypoint) {
   for (int v = -kRadius; v <= kRadius; ++v) {
     for (int u = -kRadius; u <= kRadius; ++u) {
       if (u * u + v * v >= kRadius * kRadius) continue;
-      const float weight =
-          std::exp(-static_cast<float>(u * u + v * v) / (2 * kSigma * kSigma));
+      const float weight = std::exp(-static_cast<float>(u * u + v * v) / (2 * kSigma * kSigma));
       const int x = x0 + u * step;
       const int y = y0 + v * step;
       const int reach = 2 * step;
-      const float dx = box(x, y - reach, x + reach, y + reach) -
-                       box(x - reach, y - reach, x, y + reach);
-      const float dy = box(x - reach, y, x + reach, y + reach) -
-                       box(x - reach, y - reach, x + reach, y);
+      const float dx =
+          box(x, y - reach, x + reach, y + reach) - box(x - reach, y - reach, x, y + reach);
+      const float dy =
+          box(x - reach, y, x + reach, y + reach) - box(x - reach, y - reach, x + reach, y);
       const auto sector = static_cast<std::size_t>(cv::fastAtan2(dy, dx) * (kSectors / 360.0F));
       sectors[sector % kSectors] += weight * cv::Point2f(dx, dy);
     }

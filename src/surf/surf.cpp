@@ -103,8 +103,10 @@ class SurfExtractor::Impl {
     for (const Maximum& m : maxima_) {
       const auto at = pyramid_.refined(m);
       if (!at || !fits(*at)) continue;
-      blobs_.push_back({m, {static_cast<float>(at->x_px), static_cast<float>(at->y_px),
-                            static_cast<float>(at->scale), 0.0F}, false});
+      blobs_.push_back({m,
+                        {static_cast<float>(at->x_px), static_cast<float>(at->y_px),
+                         static_cast<float>(at->scale), 0.0F},
+                        false});
     }
     const auto by_strength = [](const Blob& a, const Blob& b) {
       return stronger(a.maximum, b.maximum);

@@ -71,8 +71,8 @@ double dot(const Row& a, const Row& b) {
   return sum;
 }
 
-/// The real roots of a x^3 + b x^2 + c x + d; returns how many. None where a is 0: that is the other
-/// matrix of the pencil alone, and a sample without noise.
+/// The real roots of a x^3 + b x^2 + c x + d; returns how many. None where a is 0: that is the
+/// other matrix of the pencil alone, and a sample without noise.
 int cubic_roots(double a, double b, double c, double d, std::array<double, 3>& roots) {
   if (a == 0) return 0;
   b /= a;

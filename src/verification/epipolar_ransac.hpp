@@ -14,7 +14,8 @@ namespace loopbit {
 /// The fundamental matrix that explains most of a set of matches: RANSAC over minimal samples of
 /// seven (Hartley and Zisserman 2004, section 11.1.2), scored by truncated squared errors (MSAC),
 /// each best model so far refitted to its inliers (LO-RANSAC, Chum et al. 2003). Each call draws
-/// the same samples, so the same points give the same inliers. Its memory is kept from call to call.
+/// the same samples, so the same points give the same inliers. Its memory is kept from call to
+/// call.
 class EpipolarRansac {
  public:
   /// Pairs of points in pixels of the two images.

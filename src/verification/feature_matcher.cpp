@@ -32,8 +32,8 @@ void FeatureMatcher::find_one_way(Descriptors query, Descriptors place, double m
       std::copy_n(descriptors, count, lanes.begin());
       descriptors = lanes.data();
     }
-    kernels_.nearest_two(descriptors->data(), place.front().data(), constants_.data(),
-                         place.size(), nearest);
+    kernels_.nearest_two(descriptors->data(), place.front().data(), constants_.data(), place.size(),
+                         nearest);
     for (std::size_t lane = 0; lane < count; ++lane) {
       if (!is_distinct(nearest, lane, max_ratio)) continue;
       matches_.push_back({static_cast<int>(begin + lane), nearest.index[lane]});

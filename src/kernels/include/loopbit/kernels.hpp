@@ -25,8 +25,8 @@ inline constexpr std::size_t kCellStride = 24;
 /// Hessian responses are computed in runs of at most so many samples.
 inline constexpr std::ptrdiff_t kHessianRun = 128;
 
-/// An integral image whose rows have the even columns first, then the odd ones: corner (row, 2 i) is
-/// corners[row * stride + i], corner (row, 2 i + 1) lies `half` further.
+/// An integral image whose rows have the even columns first, then the odd ones: corner (row, 2 i)
+/// is corners[row * stride + i], corner (row, 2 i + 1) lies `half` further.
 struct IntegralView {
   const std::uint32_t* corners = nullptr;
   std::ptrdiff_t stride = 0;
@@ -53,8 +53,8 @@ struct NearestTwo {
   alignas(64) std::int32_t second_distance_sq[kMatchLanes];  ///< kNone if there is only one
 };
 
-/// The inner loops that decide the speed of loopbit, for one instruction set. All of them return the
-/// same bits; the scalar one is the reference.
+/// The inner loops that decide the speed of loopbit, for one instruction set. All of them return
+/// the same bits; the scalar one is the reference.
 struct Kernels {
   std::string_view name;
 
