@@ -17,6 +17,9 @@ constexpr int kPadding = 16;
 
 int round_up(int value, int unit) { return (value + unit - 1) / unit * unit; }
 
+/// In samples. A little more than half, for a peak half-way between two of them.
+constexpr double kMaxOffset = 0.51;
+
 /// The first x >= `x` that is marked, or one >= `end`. Reads up to 7 bytes past the end.
 int next_marked(const std::uint8_t* marks, int x, int end) {
   while (x < end) {
@@ -99,6 +102,17 @@ void HessianPyramid::take_from_below(int octave, int interval) {
   }
 }
 
+bool HessianPyramid::equals_earlier_neighbour(int octave, int interval, int x, int y) const {
+  constexpr int kEarlier = 13;  // of the 26, in order of interval, y, x
+  const float here = response(octave, interval, x, y);
+  for (int k = 0; k < kEarlier; ++k) {
+    const int dx = k % 3 - 1;
+    const int dy = k / 3 % 3 - 1;
+    if (response(octave, interval + k / 9 - 1, x + dx, y + dy) == here) return true;
+  }
+  return false;
+}
+
 void HessianPyramid::find_maxima(float min_response, const Kernels& kernels,
                                  std::vector<Maximum>& maxima) {
   for (int o = 0; o < kOctaves; ++o) {
@@ -115,6 +129,7 @@ void HessianPyramid::find_maxima(float min_response, const Kernels& kernels,
                            is_maximum_.data());
         for (int x = next_marked(is_maximum_.data(), first, end); x < end;
              x = next_marked(is_maximum_.data(), x + 1, end)) {
+          if (equals_earlier_neighbour(o, i, x, y)) continue;
           maxima.push_back({layers[1][x], static_cast<std::uint16_t>(x),
                             static_cast<std::uint16_t>(y), static_cast<std::uint8_t>(o),
                             static_cast<std::uint8_t>(i)});
@@ -150,7 +165,7 @@ std::optional<BlobCenter> HessianPyramid::refined(const Maximum& maximum) const 
   const double dx = -(c_xx * gx + c_xy * gy + c_xs * gs) / determinant;
   const double dy = -(c_xy * gx + c_yy * gy + c_ys * gs) / determinant;
   const double ds = -(c_xs * gx + c_ys * gy + c_ss * gs) / determinant;
-  if (!(std::max({std::abs(dx), std::abs(dy), std::abs(ds)}) < 0.5)) return std::nullopt;
+  if (!(std::max({std::abs(dx), std::abs(dy), std::abs(ds)}) < kMaxOffset)) return std::nullopt;
   const double step = step_px(maximum.octave);
   const double lobe = step * (maximum.interval + 1 + ds) + 1;
   return BlobCenter{(maximum.x + dx) * step, (maximum.y + dy) * step, lobe / 3 * 1.2};

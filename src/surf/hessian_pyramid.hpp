@@ -47,6 +47,7 @@ class HessianPyramid {
   void build(const IntegralImage& integral, const Kernels& kernels);
 
   /// Appends the maxima whose response is above `min_response`, of the two middle intervals.
+  /// Of equal neighbours, the first is one.
   void find_maxima(float min_response, const Kernels& kernels, std::vector<Maximum>& maxima);
 
   /// By a quadric through the 27 samples (Brown and Lowe, BMVC 2002); nothing if its peak is not
@@ -76,6 +77,8 @@ class HessianPyramid {
 
   void compute(const cv::Rect& tile, int octave, int first_interval, const Kernels& kernels);
   void take_from_below(int octave, int interval);
+
+  [[nodiscard]] bool equals_earlier_neighbour(int octave, int interval, int x, int y) const;
 
   const IntegralImage* integral_ = nullptr;
   std::array<Octave, kOctaves> octaves_;
