@@ -41,11 +41,59 @@ std::vector<std::uint16_t> max_overlaps(const Kernels& kernels, const Words& que
   return overlaps;
 }
 
-std::vector<std::int32_t> dot_products(const Kernels& kernels, const Bytes& descriptor,
-                                       const Bytes& descriptors) {
-  std::vector<std::int32_t> products(descriptors.size() / kDescriptorSize, -9999);
-  kernels.dot_products(descriptor.data(), descriptors.data(), products.size(), products.data());
-  return products;
+struct Neighbours {
+  std::array<std::int32_t, kMatchLanes> index{};
+  std::array<std::int32_t, kMatchLanes> distance_sq{};
+  std::array<std::int32_t, kMatchLanes> second_distance_sq{};
+
+  bool operator==(const Neighbours&) const = default;
+};
+
+/// Of kMatchLanes descriptors among `others`.
+Neighbours nearest_two(const Kernels& kernels, const std::int8_t* descriptors,
+                       const std::int8_t* others, std::size_t num_others) {
+  std::vector<std::int32_t> constants(num_others + 1);
+  kernels.describe_constants(others, num_others, constants.data());
+  NearestTwo nearest;
+  kernels.nearest_two(descriptors, others, constants.data(), num_others, nearest);
+  Neighbours neighbours;
+  std::copy_n(nearest.index, kMatchLanes, neighbours.index.begin());
+  std::copy_n(nearest.distance_sq, kMatchLanes, neighbours.distance_sq.begin());
+  std::copy_n(nearest.second_distance_sq, kMatchLanes, neighbours.second_distance_sq.begin());
+  return neighbours;
+}
+
+Neighbours nearest_two(const Kernels& kernels, const Bytes& descriptors, const Bytes& others) {
+  return nearest_two(kernels, descriptors.data(), others.data(), others.size() / kDescriptorSize);
+}
+
+std::int32_t distance_sq(const std::int8_t* a, const std::int8_t* b) {
+  std::int32_t sum = 0;
+  for (std::size_t k = 0; k < kDescriptorSize; ++k) sum += (a[k] - b[k]) * (a[k] - b[k]);
+  return sum;
+}
+
+/// What nearest_two has to find, from the definition: distances in order, stably.
+Neighbours expected_neighbours(const Bytes& descriptors, const Bytes& others) {
+  Neighbours expected;
+  for (std::size_t lane = 0; lane < kMatchLanes; ++lane) {
+    std::vector<std::pair<std::int32_t, std::int32_t>> order;
+    for (std::size_t i = 0; i < others.size() / kDescriptorSize; ++i) {
+      order.emplace_back(distance_sq(descriptors.data() + lane * kDescriptorSize,
+                                     others.data() + i * kDescriptorSize),
+                         static_cast<std::int32_t>(i));
+    }
+    std::sort(order.begin(), order.end());
+    order.resize(std::max<std::size_t>(order.size(), 2), {NearestTwo::kNone, 0});
+    expected.distance_sq[lane] = order[0].first;
+    expected.index[lane] = order[0].second;
+    expected.second_distance_sq[lane] = order[1].first;
+  }
+  if (others.size() == kDescriptorSize) {
+    expected.second_distance_sq.fill(NearestTwo::kNone);
+    expected.index.fill(0);
+  }
+  return expected;
 }
 
 class EveryKernel : public testing::TestWithParam<const Kernels*> {};
@@ -100,50 +148,72 @@ TEST_P(EveryKernel, ReadsContentsAtAnyWord) {
   }
 }
 
-TEST_P(EveryKernel, MultipliesTheLargestDescriptors) {
-  const Bytes highest(kDescriptorSize, 127);
-  Bytes others = highest;
-  others.insert(others.end(), kDescriptorSize, -127);
-  others.insert(others.end(), kDescriptorSize, 0);
-  constexpr int kLargest = 64 * 127 * 127;
-  EXPECT_EQ(dot_products(*GetParam(), highest, others),
-            (std::vector<std::int32_t>{kLargest, -kLargest, 0}));
-  EXPECT_TRUE(dot_products(*GetParam(), highest, {}).empty());
+TEST_P(EveryKernel, FindsTheNearestTwoAmongAnyNumber) {
+  Random random;
+  for (const std::size_t num_others : {1U, 2U, 3U, 4U, 5U, 7U, 8U, 31U, 64U, 301U}) {
+    const Bytes descriptors = random_bytes(random, kMatchLanes);
+    const Bytes others = random_bytes(random, num_others);
+    ASSERT_EQ(nearest_two(*GetParam(), descriptors, others),
+              expected_neighbours(descriptors, others))
+        << num_others << " others";
+  }
 }
 
-TEST_P(EveryKernel, MultipliesEachValueWithItsLike) {
+TEST_P(EveryKernel, FirstOfEquallyNearOnesIsNearest) {
+  Random random;
+  const Bytes descriptors = random_bytes(random, kMatchLanes);
+  Bytes others = random_bytes(random, 3);
+  others.insert(others.end(), descriptors.begin(), descriptors.end());
+  others.insert(others.end(), descriptors.begin(), descriptors.end());
+  const Neighbours found = nearest_two(*GetParam(), descriptors, others);
+  EXPECT_EQ(found, expected_neighbours(descriptors, others));
+  for (std::size_t lane = 0; lane < kMatchLanes; ++lane) {
+    EXPECT_EQ(found.index[lane], static_cast<int>(lane) + 3);
+    EXPECT_EQ(found.distance_sq[lane], 0);
+    EXPECT_EQ(found.second_distance_sq[lane], 0);
+  }
+}
+
+TEST_P(EveryKernel, MeasuresTheLargestDistances) {
+  const Bytes highest(kMatchLanes * kDescriptorSize, 127);
+  Bytes others(kDescriptorSize, -127);
+  others.insert(others.end(), kDescriptorSize, 0);
+  const Neighbours found = nearest_two(*GetParam(), highest, others);
+  EXPECT_EQ(found.index[0], 1);
+  EXPECT_EQ(found.distance_sq[0], 64 * 127 * 127);
+  EXPECT_EQ(found.second_distance_sq[0], 64 * 254 * 254);
+}
+
+TEST_P(EveryKernel, ComparesEachValueWithItsLike) {
   for (std::size_t i = 0; i < kDescriptorSize; ++i) {
-    Bytes one(kDescriptorSize, 0);
-    one[i] = -3;
+    Bytes one(kMatchLanes * kDescriptorSize, 0);
+    one[5 * kDescriptorSize + i] = -3;
     Bytes rising(kDescriptorSize);
     for (std::size_t k = 0; k < kDescriptorSize; ++k) rising[k] = static_cast<std::int8_t>(k + 1);
-    ASSERT_EQ(dot_products(*GetParam(), one, rising).front(), -3 * static_cast<int>(i + 1));
+    const Neighbours found = nearest_two(*GetParam(), one, rising);
+    const int square = 64 * 65 * 129 / 6;
+    ASSERT_EQ(found.distance_sq[4], square);
+    ASSERT_EQ(found.distance_sq[5], square + 9 + 6 * static_cast<int>(i + 1));
   }
 }
 
-TEST_P(EveryKernel, ProductsEqualTheScalarOnes) {
+TEST_P(EveryKernel, WithoutOthersThereIsNoNeighbour) {
   Random random;
-  for (const std::size_t num_descriptors : {1U, 2U, 3U, 4U, 5U, 31U, 64U, 701U}) {
-    const Bytes descriptor = random_bytes(random, 1);
-    const Bytes descriptors = random_bytes(random, num_descriptors);
-    ASSERT_EQ(dot_products(*GetParam(), descriptor, descriptors),
-              dot_products(scalar(), descriptor, descriptors))
-        << num_descriptors << " descriptors";
-  }
+  const Neighbours found = nearest_two(*GetParam(), random_bytes(random, kMatchLanes), {});
+  for (const std::int32_t distance : found.distance_sq) EXPECT_EQ(distance, NearestTwo::kNone);
+  for (const std::int32_t second : found.second_distance_sq) EXPECT_EQ(second, NearestTwo::kNone);
 }
 
 TEST_P(EveryKernel, ReadsDescriptorsAtAnyByte) {
   Random random;
-  const Bytes descriptor = random_bytes(random, 2);
-  const Bytes descriptors = random_bytes(random, 6);
+  const Bytes descriptors = random_bytes(random, kMatchLanes + 1);
+  const Bytes others = random_bytes(random, 7);
   for (std::size_t shift = 0; shift < kDescriptorSize; ++shift) {
-    std::array<std::int32_t, 5> products{};
-    std::array<std::int32_t, 5> expected{};
-    GetParam()->dot_products(descriptor.data() + shift, descriptors.data() + 64 - shift, 5,
-                             products.data());
-    scalar().dot_products(descriptor.data() + shift, descriptors.data() + 64 - shift, 5,
-                          expected.data());
-    EXPECT_EQ(products, expected) << "from byte " << shift;
+    const auto found = [&](const Kernels& kernels) {
+      return nearest_two(kernels, descriptors.data() + shift,
+                         others.data() + kDescriptorSize - shift, 6);
+    };
+    EXPECT_EQ(found(*GetParam()), found(scalar())) << "from byte " << shift;
   }
 }
 

@@ -74,6 +74,85 @@ TEST(Surf, ReadsPartOfAnImage) {
   EXPECT_EQ(extract_unscaled(part).descriptors, extract_unscaled(part.clone()).descriptors);
 }
 
+/// Everything to the last bit.
+void expect_same(const Features& a, const Features& b) {
+  EXPECT_EQ(a.working_size_px, b.working_size_px);
+  EXPECT_EQ(a.num_dark, b.num_dark);
+  EXPECT_EQ(a.descriptors, b.descriptors);
+  ASSERT_EQ(a.keypoints.size(), b.keypoints.size());
+  EXPECT_EQ(places_of(a, 0, a.keypoints.size()), places_of(b, 0, b.keypoints.size()));
+  for (std::size_t i = 0; i < a.keypoints.size(); ++i) {
+    EXPECT_EQ(a.keypoints[i].angle_rad, b.keypoints[i].angle_rad);
+  }
+}
+
+Features extract_with(const Kernels& kernels, const cv::Mat1b& gray, const SurfOptions& options) {
+  Features features;
+  SurfExtractor(options, kernels).extract(gray, features);
+  return features;
+}
+
+TEST(Surf, EveryKernelFindsTheSameFeatures) {
+  for (const cv::Size size : {cv::Size(640, 480), cv::Size(333, 251), cv::Size(129, 640),
+                              cv::Size(640, 97), cv::Size(64, 64), cv::Size(65, 47)}) {
+    const cv::Mat1b gray = textured_image(size, size.width);
+    for (const bool upright : {true, false}) {
+      const SurfOptions options{.working_side_px = std::max(size.width, size.height),
+                                .upright = upright};
+      const Features expected = extract_with(*available_kernels().front(), gray, options);
+      for (const Kernels* kernels : available_kernels()) {
+        SCOPED_TRACE(std::string(kernels->name));
+        expect_same(extract_with(*kernels, gray, options), expected);
+      }
+    }
+  }
+}
+
+TEST(Surf, EveryKernelFindsTheSameFeaturesInRealImages) {
+  for (const std::string folder : {"kitti03", "corridor_loop", "euroc_room", "lateral_corridor"}) {
+    LOOPBIT_NEEDS_DATA(folder);
+    for (const std::size_t index : {0U, 33U, 66U}) {
+      const cv::Mat1b gray = real_image(folder + "/images", index);
+      const Features expected = extract_with(*available_kernels().front(), gray, {});
+      EXPECT_GT(expected.keypoints.size(), 100U);
+      for (const Kernels* kernels : available_kernels()) {
+        SCOPED_TRACE(std::string(kernels->name));
+        expect_same(extract_with(*kernels, gray, {}), expected);
+      }
+    }
+  }
+}
+
+TEST(Surf, ExtractorForgetsTheImageBefore) {
+  SurfExtractor extractor;
+  Features features;
+  for (const cv::Size size : {cv::Size(640, 480), cv::Size(200, 640), cv::Size(640, 193),
+                              cv::Size(32, 32), cv::Size(640, 480)}) {
+    const cv::Mat1b gray = textured_image(size, 12);
+    extractor.extract(gray, features);
+    expect_same(features, extract_surf(gray));
+  }
+}
+
+TEST(Surf, FeaturesOfAFrameTakeAtMost48KilobytesByDefault) {
+  const std::size_t bytes = sizeof(Keypoint) + sizeof(Descriptor);
+  EXPECT_LE(static_cast<std::size_t>(SurfOptions().max_keypoints) * bytes, 48U * 1024U);
+}
+
+TEST(Surf, KeypointsAreSpreadOverTheImage) {
+  // One corner of the image is full of strong blobs, the rest has faint ones.
+  cv::Mat1b gray = textured_image({640, 480}, 13);
+  cv::Mat faint;
+  gray.convertTo(faint, CV_8U, 0.2, 100);
+  gray(cv::Rect(0, 0, 320, 240)).copyTo(faint(cv::Rect(0, 0, 320, 240)));
+  const Features features = extract_unscaled(faint, 300);
+  const auto in_corner =
+      std::count_if(features.keypoints.begin(), features.keypoints.end(),
+                    [](const Keypoint& k) { return k.x_px < 320 && k.y_px < 240; });
+  EXPECT_EQ(features.keypoints.size(), 300U);
+  EXPECT_LT(in_corner, 260);
+}
+
 TEST(Surf, ShiftedCopyMatchesAtThatShift) {
   const cv::Point moved(16, -8);
   const Features query = extract_unscaled(view(3));
@@ -118,7 +197,7 @@ TEST(Surf, NegativeSwapsDarkAndBright) {
 }
 
 TEST(Surf, StrongestComesFirst) {
-  cv::Mat1b image(160, 240, 128);
+  cv::Mat1b image(180, 240, 128);
   cv::circle(image, {60, 60}, 8, 100, cv::FILLED, cv::LINE_AA);
   cv::circle(image, {160, 60}, 8, 20, cv::FILLED, cv::LINE_AA);
   cv::circle(image, {60, 110}, 8, 250, cv::FILLED, cv::LINE_AA);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/calib3d.hpp>
 
 #include "test_support.hpp"
 
@@ -252,6 +253,26 @@ TEST(EpipolarInliers, FindsNearlyAllRightMatchesAmongOutliers) {
   }
 }
 
+/// OpenCV's MAGSAC++ (Barath et al., CVPR 2020), with as many samples as we take at most.
+std::size_t opencv_inliers(const TwoViews& views) {
+  std::vector<cv::Point2f> query;
+  std::vector<cv::Point2f> place;
+  for (const Keypoint& k : views.query.keypoints) query.emplace_back(k.x_px, k.y_px);
+  for (const Keypoint& k : views.place.keypoints) place.emplace_back(k.x_px, k.y_px);
+  cv::Mat is_inlier;
+  cv::findFundamentalMat(query, place, cv::USAC_MAGSAC, kErrorPx, 0.999, 1000, is_inlier);
+  return static_cast<std::size_t>(cv::countNonZero(is_inlier));
+}
+
+TEST(EpipolarInliers, AreAboutAsManyAsOpenCvFinds) {
+  for (int run = 0; run < 10; ++run) {
+    Random random(run);
+    const TwoViews views = two_views(random, 50, 50);
+    const double expected = static_cast<double>(opencv_inliers(views));
+    EXPECT_NEAR(static_cast<double>(inliers_of(views).size()), expected, 0.1 * expected) << run;
+  }
+}
+
 TEST(EpipolarInliers, KeepsTheOrderAndThePairsOfTheMatches) {
   Random random;
   TwoViews views = two_views(random, 30, 0);
@@ -367,6 +388,22 @@ TEST(Verify, ShiftedViewHasManyInliers) {
   EXPECT_LE(result.inliers.size(), result.matches.size());
   EXPECT_GT(result.distinct_inliers, 40);
   EXPECT_LT(result.distinct_inliers, static_cast<int>(result.inliers.size()));
+}
+
+TEST(Verify, HalvesMakeTheWhole) {
+  Verifier verifier;
+  Verification halves;
+  const Features query = extract_surf(view(2));
+  for (const cv::Point moved : {cv::Point(12, 5), cv::Point(0, 0), cv::Point(30, -20)}) {
+    const Features place = extract_surf(view(2, moved));
+    const Verification whole = verify(query, place);
+    verifier.match(query, place, halves);
+    EXPECT_EQ(halves.matches, whole.matches);
+    EXPECT_TRUE(halves.inliers.empty());
+    verifier.find_geometry(query, place, halves);
+    EXPECT_EQ(halves.inliers, whole.inliers);
+    EXPECT_EQ(halves.distinct_inliers, whole.distinct_inliers);
+  }
 }
 
 TEST(Verify, OtherSceneHasFewInliers) {

@@ -25,7 +25,7 @@ void max_overlaps(const std::uint64_t* queries, std::size_t num_queries,
 extern const Kernels kScalarKernels;
 #if defined(__x86_64__)
 extern const Kernels kAvx2Kernels;    ///< needs AVX2
-extern const Kernels kAvx512Kernels;  ///< needs AVX-512 F, BW and VPOPCNTDQ
+extern const Kernels kAvx512Kernels;  ///< needs AVX-512 F, BW, DQ, VL, VNNI and VPOPCNTDQ
 #endif
 
 }  // namespace loopbit

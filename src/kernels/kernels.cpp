@@ -20,10 +20,11 @@ std::vector<const Kernels*> kernels_of_this_processor() {
   std::vector<const Kernels*> kernels{&kScalarKernels};
 #if defined(__x86_64__)
   if (__builtin_cpu_supports("avx2") != 0) kernels.push_back(&kAvx2Kernels);
-  if (__builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
-      __builtin_cpu_supports("avx512vpopcntdq") != 0) {
-    kernels.push_back(&kAvx512Kernels);
-  }
+  const bool has_avx512 =
+      __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
+      __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
+      __builtin_cpu_supports("avx512vnni") != 0 && __builtin_cpu_supports("avx512vpopcntdq") != 0;
+  if (has_avx512) kernels.push_back(&kAvx512Kernels);
 #endif
   return kernels;
 }

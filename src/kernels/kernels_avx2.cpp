@@ -4,6 +4,7 @@
 #include <immintrin.h>
 
 #include "kernel_variants.hpp"
+#include "surf_loops.hpp"
 
 namespace loopbit {
 namespace {
@@ -40,35 +41,123 @@ int overlap(const std::uint64_t* a, const std::uint64_t* b) {
   return sum_lanes_epi64(sums);
 }
 
-__m256i widen(const std::int8_t* values) {
-  return _mm256_cvtepi8_epi16(_mm_loadu_si128(reinterpret_cast<const __m128i*>(values)));
+// Matching. VPMADDUBSW multiplies unsigned by signed bytes; |a| times b with the sign of a is the
+// product, and two products of at most 127 * 127 fit in its 16 bits.
+
+constexpr std::size_t kChunks = kDescriptorSize / 4;
+constexpr std::size_t kLanes = 8;
+
+/// For each lane, the sum of the products of its 4 bytes.
+__m256i products_of_4(__m256i magnitudes, __m256i signs, __m256i bytes) {
+  const __m256i pairs = _mm256_maddubs_epi16(magnitudes, _mm256_sign_epi8(bytes, signs));
+  return _mm256_madd_epi16(pairs, _mm256_set1_epi16(1));
 }
 
-int sum_lanes_epi32(__m256i lanes) {
-  __m128i sums = _mm_add_epi32(_mm256_castsi256_si128(lanes), _mm256_extracti128_si256(lanes, 1));
-  sums = _mm_add_epi32(sums, _mm_shuffle_epi32(sums, _MM_SHUFFLE(1, 0, 3, 2)));
-  sums = _mm_add_epi32(sums, _mm_shuffle_epi32(sums, _MM_SHUFFLE(2, 3, 0, 1)));
-  return _mm_cvtsi128_si32(sums);
-}
-
-void dot_products(const std::int8_t* descriptor, const std::int8_t* descriptors,
-                  std::size_t num_descriptors, std::int32_t* products) {
-  const __m256i a0 = widen(descriptor);
-  const __m256i a1 = widen(descriptor + 16);
-  const __m256i a2 = widen(descriptor + 32);
-  const __m256i a3 = widen(descriptor + 48);
+void describe_constants(const std::int8_t* descriptors, std::size_t num_descriptors,
+                        std::int32_t* constants) {
   for (std::size_t i = 0; i < num_descriptors; ++i) {
-    const std::int8_t* b = descriptors + i * kDescriptorSize;
-    const __m256i low =
-        _mm256_add_epi32(_mm256_madd_epi16(a0, widen(b)), _mm256_madd_epi16(a1, widen(b + 16)));
-    const __m256i high = _mm256_add_epi32(_mm256_madd_epi16(a2, widen(b + 32)),
-                                          _mm256_madd_epi16(a3, widen(b + 48)));
-    products[i] = sum_lanes_epi32(_mm256_add_epi32(low, high));
+    const __m256i low = load(descriptors + i * kDescriptorSize);
+    const __m256i high = load(descriptors + i * kDescriptorSize + 32);
+    const __m256i sums = _mm256_add_epi32(products_of_4(_mm256_abs_epi8(low), low, low),
+                                          products_of_4(_mm256_abs_epi8(high), high, high));
+    __m128i half = _mm_add_epi32(_mm256_castsi256_si128(sums), _mm256_extracti128_si256(sums, 1));
+    half = _mm_add_epi32(half, _mm_shuffle_epi32(half, _MM_SHUFFLE(1, 0, 3, 2)));
+    half = _mm_add_epi32(half, _mm_shuffle_epi32(half, _MM_SHUFFLE(2, 3, 0, 1)));
+    constants[i] = _mm_cvtsi128_si32(half);
+  }
+}
+
+/// 8 descriptors, chunk by chunk of 4 bytes.
+struct Lanes {
+  __m256i bytes[kChunks];
+  __m256i magnitudes[kChunks];
+  __m256i squares;  ///< of their lengths
+};
+
+void transpose(const std::int8_t* descriptors, Lanes& lanes) {
+  const __m256i first_bytes = _mm256_mullo_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
+                                                 _mm256_set1_epi32(kDescriptorSize));
+  lanes.squares = _mm256_setzero_si256();
+  for (std::size_t c = 0; c < kChunks; ++c) {
+    const auto* bytes = reinterpret_cast<const int*>(descriptors + 4 * c);
+    lanes.bytes[c] = _mm256_i32gather_epi32(bytes, first_bytes, 1);
+    lanes.magnitudes[c] = _mm256_abs_epi8(lanes.bytes[c]);
+    lanes.squares =
+        _mm256_add_epi32(lanes.squares, products_of_4(lanes.magnitudes[c], lanes.bytes[c],  //
+                                                      lanes.bytes[c]));
+  }
+}
+
+struct BestTwo {
+  __m256i index;
+  __m256i best;
+  __m256i second;
+
+  void offer(__m256i distances, std::int32_t number) {
+    const __m256i nearer = _mm256_cmpgt_epi32(best, distances);
+    second = _mm256_min_epi32(second, _mm256_max_epi32(best, distances));
+    best = _mm256_min_epi32(best, distances);
+    index = _mm256_blendv_epi8(index, _mm256_set1_epi32(number), nearer);
+  }
+};
+
+/// Offers the descriptors from `others` on, as many as Count.
+template <std::size_t Count>
+void offer_products(const Lanes& lanes, const std::int8_t* others, const std::int32_t* constants,
+                    std::int32_t number, BestTwo& two) {
+  __m256i sums[Count];
+  for (std::size_t i = 0; i < Count; ++i) sums[i] = _mm256_setzero_si256();
+  for (std::size_t c = 0; c < kChunks; ++c) {
+    for (std::size_t i = 0; i < Count; ++i) {
+      std::int32_t chunk;
+      __builtin_memcpy(&chunk, others + i * kDescriptorSize + 4 * c, sizeof chunk);
+      sums[i] = _mm256_add_epi32(
+          sums[i], products_of_4(lanes.magnitudes[c], lanes.bytes[c], _mm256_set1_epi32(chunk)));
+    }
+  }
+  for (std::size_t i = 0; i < Count; ++i) {
+    const __m256i squares = _mm256_add_epi32(lanes.squares, _mm256_set1_epi32(constants[i]));
+    two.offer(_mm256_sub_epi32(squares, _mm256_add_epi32(sums[i], sums[i])),
+              number + static_cast<std::int32_t>(i));
+  }
+}
+
+/// nearest_two for 8 of the 16 descriptors.
+void nearest_two_of_8(const Lanes& lanes, const std::int8_t* others, const std::int32_t* constants,
+                      std::size_t num_others, std::size_t first, NearestTwo& nearest) {
+  constexpr std::size_t kAtOnce = 4;
+  const __m256i none = _mm256_set1_epi32(NearestTwo::kNone);
+  BestTwo two{_mm256_setzero_si256(), none, none};
+  std::size_t i = 0;
+  for (; i + kAtOnce <= num_others; i += kAtOnce) {
+    offer_products<kAtOnce>(lanes, others + i * kDescriptorSize, constants + i,
+                            static_cast<std::int32_t>(i), two);
+  }
+  for (; i < num_others; ++i) {
+    offer_products<1>(lanes, others + i * kDescriptorSize, constants + i,
+                      static_cast<std::int32_t>(i), two);
+  }
+  const auto store = [&](std::int32_t* to, __m256i values) {
+    _mm256_store_si256(reinterpret_cast<__m256i*>(to + first), values);
+  };
+  store(nearest.index, two.index);
+  store(nearest.distance_sq, two.best);
+  store(nearest.second_distance_sq, two.second);
+}
+
+void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
+                 const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest) {
+  for (std::size_t first = 0; first < kMatchLanes; first += kLanes) {
+    Lanes lanes;
+    transpose(descriptors + first * kDescriptorSize, lanes);
+    nearest_two_of_8(lanes, others, constants, num_others, first, nearest);
   }
 }
 
 }  // namespace
 
-const Kernels kAvx2Kernels{"avx2", max_overlaps<overlap>, dot_products};
+const Kernels kAvx2Kernels{"avx2",       max_overlaps<overlap>, describe_constants, nearest_two,
+                           integral_row, hessian_row,           maxima_row,         cell_means,
+                           describe};
 
 }  // namespace loopbit

@@ -3,6 +3,7 @@
 #include <bit>
 
 #include "kernel_variants.hpp"
+#include "surf_loops.hpp"
 
 namespace loopbit {
 namespace {
@@ -13,18 +14,49 @@ int overlap(const std::uint64_t* a, const std::uint64_t* b) {
   return set;
 }
 
-void dot_products(const std::int8_t* descriptor, const std::int8_t* descriptors,
-                  std::size_t num_descriptors, std::int32_t* products) {
+std::int32_t dot(const std::int8_t* a, const std::int8_t* b) {
+  std::int32_t sum = 0;
+  for (std::size_t k = 0; k < kDescriptorSize; ++k) sum += a[k] * b[k];
+  return sum;
+}
+
+void describe_constants(const std::int8_t* descriptors, std::size_t num_descriptors,
+                        std::int32_t* constants) {
   for (std::size_t i = 0; i < num_descriptors; ++i) {
-    const std::int8_t* other = descriptors + i * kDescriptorSize;
-    std::int32_t sum = 0;
-    for (std::size_t k = 0; k < kDescriptorSize; ++k) sum += descriptor[k] * other[k];
-    products[i] = sum;
+    const std::int8_t* descriptor = descriptors + i * kDescriptorSize;
+    constants[i] = dot(descriptor, descriptor);
+  }
+}
+
+void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
+                 const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest) {
+  for (std::size_t lane = 0; lane < kMatchLanes; ++lane) {
+    const std::int8_t* descriptor = descriptors + lane * kDescriptorSize;
+    const std::int32_t square = dot(descriptor, descriptor);
+    std::int32_t index = 0;
+    std::int32_t best = NearestTwo::kNone;
+    std::int32_t second = NearestTwo::kNone;
+    for (std::size_t i = 0; i < num_others; ++i) {
+      const std::int32_t distance =
+          square + constants[i] - 2 * dot(descriptor, others + i * kDescriptorSize);
+      if (distance < best) {
+        second = best;
+        best = distance;
+        index = static_cast<std::int32_t>(i);
+      } else if (distance < second) {
+        second = distance;
+      }
+    }
+    nearest.index[lane] = index;
+    nearest.distance_sq[lane] = best;
+    nearest.second_distance_sq[lane] = second;
   }
 }
 
 }  // namespace
 
-const Kernels kScalarKernels{"scalar", max_overlaps<overlap>, dot_products};
+const Kernels kScalarKernels{"scalar",     max_overlaps<overlap>, describe_constants, nearest_two,
+                             integral_row, hessian_row,           maxima_row,         cell_means,
+                             describe};
 
 }  // namespace loopbit

@@ -54,9 +54,11 @@ cv::Point2f relative_position(const Features& features, int index) {
 class LoopDetector::Impl {
  public:
   explicit Impl(const LoopDetectorOptions& options)
-      : options_(options), agreement_(options.decision) {
+      : options_(options),
+        agreement_(options.decision),
+        surf_(options.surf),
+        verifier_(options.verification) {
     validate(options);
-    (void)active_kernels();  // a kernel that cannot be had is an error now, not at the first frame
   }
 
   /// One frame as the detector sees it: all that remember() needs.
@@ -82,7 +84,7 @@ class LoopDetector::Impl {
     detection.times.content_ms = stopwatch.lap_ms();
 
     // Step 3 begins: features. They also tell how far back the present view reaches.
-    seen.features = extract_surf(gray, options_.surf);
+    surf_.extract(gray, seen.features);
     detection.times.features_ms = stopwatch.lap_ms();
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, timestamp_s);
@@ -93,9 +95,7 @@ class LoopDetector::Impl {
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that geometry and the frames before agree on.
-    for (const Candidate& candidate : candidates) {
-      seen.verified.push_back(verified(seen.features, candidate));
-    }
+    verify_candidates(candidates, seen);
     decide(seen, end, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
     return detection;
@@ -158,12 +158,46 @@ class LoopDetector::Impl {
     return index_.add(content);
   }
 
-  [[nodiscard]] VerifiedCandidate verified(const Features& query,
-                                           const Candidate& candidate) const {
-    const Verification result = verify(query, features(candidate.place), options_.verification);
+  /// The first half of the verification of a candidate: its matches.
+  [[nodiscard]] VerifiedCandidate matched(const Features& query, const Candidate& candidate,
+                                          Verification& result) const {
+    verifier_.match(query, features(candidate.place), result);
     return {candidate, recent_view_.step_of(candidate.place),
-            static_cast<int>(result.matches.size()), static_cast<int>(result.inliers.size()),
-            result.distinct_inliers};
+            static_cast<int>(result.matches.size())};
+  }
+
+  /// The second half: their geometry.
+  void find_geometry(const Features& query, VerifiedCandidate& candidate,
+                     Verification& result) const {
+    verifier_.find_geometry(query, features(candidate.candidate.place), result);
+    candidate.inliers = static_cast<int>(result.inliers.size());
+    candidate.distinct_inliers = result.distinct_inliers;
+  }
+
+  /// The score if all matches were distinct inliers: no geometry can lead to a higher one.
+  [[nodiscard]] double highest_score(VerifiedCandidate candidate, const Observation& seen) const {
+    candidate.distinct_inliers = candidate.matches;
+    return agreement_.score(candidate, seen.look.is_step);
+  }
+
+  /// Matches all candidates, which is cheap, and seeks the geometry of the most promising first,
+  /// until none of the others can have a higher score than the best. Those keep no inliers: they
+  /// change nothing now, and support no later match.
+  void verify_candidates(const std::vector<Candidate>& candidates, Observation& seen) const {
+    verifications_.resize(std::max(verifications_.size(), candidates.size()));
+    std::vector<std::pair<double, std::size_t>> order;
+    for (const Candidate& candidate : candidates) {
+      const std::size_t i = seen.verified.size();
+      seen.verified.push_back(matched(seen.features, candidate, verifications_[i]));
+      order.emplace_back(-highest_score(seen.verified[i], seen), i);
+    }
+    std::sort(order.begin(), order.end());
+    double best = 0;
+    for (const auto& [negative_bound, i] : order) {
+      if (-negative_bound < best) break;
+      find_geometry(seen.features, seen.verified[i], verifications_[i]);
+      best = std::max(best, agreement_.score(seen.verified[i], seen.look.is_step));
+    }
   }
 
   /// How far back the view of a new frame reaches.
@@ -172,8 +206,10 @@ class LoopDetector::Impl {
         recent_view_.empty() ||
         similarity(seen.content, index_.content(recent_view_.latest_step())) < kUnmovedSimilarity;
     return recent_view_.look(size(), is_step, [&](PlaceId place) {
-      return is_window_fixed() ||
-             verified(seen.features, {place, 0}).inliers >= options_.exclusion.in_view_inliers;
+      if (is_window_fixed()) return true;
+      VerifiedCandidate recent = matched(seen.features, {place, 0}, verification_);
+      find_geometry(seen.features, recent, verification_);
+      return recent.inliers >= options_.exclusion.in_view_inliers;
     });
   }
 
@@ -210,7 +246,9 @@ class LoopDetector::Impl {
       if (place == middle) continue;
       const double xi = similarity(seen.content, index_.content(place),
                                    options_.retrieval.shift_tolerance_columns);
-      const VerifiedCandidate neighbour = verified(seen.features, {place, xi});
+      VerifiedCandidate neighbour = matched(seen.features, {place, xi}, verification_);
+      if (highest_score(neighbour, seen) < agreement_.score(best, seen.look.is_step)) continue;
+      find_geometry(seen.features, neighbour, verification_);
       if (rank(neighbour, seen) > rank(best, seen)) best = neighbour;
     }
     return best;
@@ -241,6 +279,11 @@ class LoopDetector::Impl {
   std::vector<double> times_s_;     ///< of each place; 0 where there is none
   RecentView recent_view_;
   Agreement agreement_;
+  // Working memory, which makes const functions unfit for threads.
+  mutable SurfExtractor surf_;
+  mutable Verifier verifier_;
+  mutable std::vector<Verification> verifications_;  ///< of the candidates of one frame
+  mutable Verification verification_;                ///< of one other place
 };
 
 LoopDetector::LoopDetector(const LoopDetectorOptions& options)

@@ -4,104 +4,168 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <tuple>
+#include <vector>
 
-#include <dlib/image_keypoint/hessian_pyramid.h>
-#include <dlib/image_keypoint/surf.h>
-#include <dlib/opencv.h>
 #include <opencv2/imgproc.hpp>
+
+#include "hessian_pyramid.hpp"
+#include "integral_image.hpp"
+#include "patch.hpp"
 
 namespace loopbit {
 namespace {
 
-constexpr int kOctaves = 4;
-constexpr int kIntervals = 6;
-constexpr int kInitialStepPx = 2;
-/// In dlib's unit of the Hessian's determinant, whose customary threshold is 30: noise alone.
-constexpr double kMinResponse = 1.0;
-/// A descriptor reaches this many scales from its keypoint: half of 20 samples, turned by up to 45
-/// degrees, and half a Haar wavelet.
-constexpr double kUprightReachScales = 11.0;
-constexpr double kRotatedReachScales = 15.5;
-constexpr double kDescriptorScale = 127.0 / 0.5;
+/// In squared grey levels: below, the 8 bits of a pixel are too coarse to tell a blob.
+constexpr float kMinResponse = 1.0F;
+/// The grid's cells are about this wide and high, at least one.
+constexpr int kGridCellPx = 80;
+/// A cell may hold this many times its share of the budget.
+constexpr int kMaxShares = 3;
 
-using IntegralImage = dlib::integral_image_generic<long>;
+struct Blob {
+  Maximum maximum;
+  Keypoint keypoint;
+  bool bright = false;
+};
 
-cv::Mat1b working_image(const cv::Mat1b& gray, int working_side_px) {
-  const double factor = static_cast<double>(working_side_px) / std::max(gray.cols, gray.rows);
-  const cv::Size size(std::max(1, cvRound(gray.cols * factor)),
-                      std::max(1, cvRound(gray.rows * factor)));
-  if (size == gray.size()) return gray;
-  cv::Mat resized;
-  cv::resize(gray, resized, size, 0, 0, factor < 1 ? cv::INTER_AREA : cv::INTER_LINEAR_EXACT);
-  return resized;
-}
-
-bool is_bright(const dlib::interest_point& point) { return point.laplacian < 0; }
-
-auto rank(const dlib::interest_point& point) {
-  return std::tuple(-point.score, point.center.y(), point.center.x(), point.scale);
-}
-
-/// The strongest keypoints whose descriptors lie within the image, dark ones first.
-std::vector<dlib::interest_point> detect(const IntegralImage& integral,
-                                         const SurfOptions& options) {
-  dlib::hessian_pyramid pyramid;
-  pyramid.build_pyramid(integral, kOctaves, kIntervals, kInitialStepPx);
-  std::vector<dlib::interest_point> points;
-  dlib::get_interest_points(pyramid, kMinResponse, points);
-
-  const double reach_scales = options.upright ? kUprightReachScales : kRotatedReachScales;
-  std::erase_if(points, [&](const dlib::interest_point& point) {
-    const auto reach_px = static_cast<unsigned long>(std::ceil(reach_scales * point.scale)) + 2;
-    return !dlib::get_rect(integral).contains(
-        dlib::centered_rect(dlib::point(point.center), 2 * reach_px + 1, 2 * reach_px + 1));
-  });
-  std::sort(points.begin(), points.end(),
-            [](const auto& a, const auto& b) { return rank(a) < rank(b); });
-  points.resize(std::min(points.size(), static_cast<std::size_t>(options.max_keypoints)));
-  std::stable_partition(points.begin(), points.end(), std::not_fn(is_bright));
-  return points;
-}
-
-Descriptor quantize(const dlib::matrix<double, 64, 1>& values) {
-  Descriptor descriptor{};
-  std::transform(values.begin(), values.end(), descriptor.begin(), [](double value) {
-    return static_cast<std::int8_t>(
-        std::clamp(std::round(value * kDescriptorScale), -127.0, 127.0));
-  });
-  return descriptor;
-}
-
-void describe(const IntegralImage& integral, const dlib::interest_point& point, bool upright,
-              Features& features) {
-  const double angle =
-      upright ? 0.0 : dlib::compute_dominant_angle(integral, point.center, point.scale);
-  dlib::matrix<double, 64, 1> values;
-  dlib::compute_surf_descriptor(integral, point.center, point.scale, angle, values);
-  features.descriptors.push_back(quantize(values));
-  features.keypoints.push_back({static_cast<float>(point.center.x()),
-                                static_cast<float>(point.center.y()),
-                                static_cast<float>(point.scale), static_cast<float>(angle)});
+bool stronger(const Maximum& a, const Maximum& b) {
+  return std::tuple(-a.response, a.octave, a.y, a.x, a.interval) <
+         std::tuple(-b.response, b.octave, b.y, b.x, b.interval);
 }
 
 }  // namespace
 
-Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options) {
-  validate(options, "surf");
-  const cv::Mat1b image = working_image(gray, options.working_side_px);
-  IntegralImage integral;
-  integral.load(dlib::cv_image<unsigned char>(static_cast<const cv::Mat&>(image)));
-  const auto points = detect(integral, options);
+class SurfExtractor::Impl {
+ public:
+  Impl(const SurfOptions& options, const Kernels& kernels) : options_(options), kernels_(kernels) {
+    validate(options, "surf");
+  }
 
+  void extract(const cv::Mat1b& gray, Features& features) {
+    integral_.load(working_image(gray), kernels_);
+    pyramid_.build(integral_, kernels_);
+    maxima_.clear();
+    pyramid_.find_maxima(kMinResponse, kernels_, maxima_);
+    spread();
+    locate();
+    describe(features);
+  }
+
+ private:
+  const cv::Mat1b& working_image(const cv::Mat1b& gray) {
+    const double factor =
+        static_cast<double>(options_.working_side_px) / std::max(gray.cols, gray.rows);
+    const cv::Size size(std::max(1, cvRound(gray.cols * factor)),
+                        std::max(1, cvRound(gray.rows * factor)));
+    if (size == gray.size()) return gray;
+    cv::resize(gray, working_, size, 0, 0, factor < 1 ? cv::INTER_AREA : cv::INTER_LINEAR_EXACT);
+    return working_;
+  }
+
+  /// Keeps the strongest maxima of each cell of a grid.
+  void spread() {
+    const cv::Size size = integral_.size_px();
+    const int columns = std::max(1, size.width / kGridCellPx);
+    const int rows = std::max(1, size.height / kGridCellPx);
+    const auto cell_of = [&](const Maximum& m) {
+      const int step = HessianPyramid::step_px(m.octave);
+      return static_cast<std::size_t>(m.y * step * rows / size.height * columns +
+                                      m.x * step * columns / size.width);
+    };
+    const auto num_cells = static_cast<std::size_t>(columns * rows);
+    const std::size_t limit =
+        kMaxShares * static_cast<std::size_t>(options_.max_keypoints) / num_cells + 1;
+    cells_.resize(std::max(cells_.size(), num_cells));
+    for (auto& cell : cells_) cell.clear();
+    for (const Maximum& m : maxima_) cells_[cell_of(m)].push_back(m);
+    maxima_.clear();
+    for (auto& cell : cells_) {
+      if (cell.size() > limit) {
+        std::nth_element(cell.begin(), cell.begin() + static_cast<std::ptrdiff_t>(limit),
+                         cell.end(), stronger);
+        cell.resize(limit);
+      }
+      maxima_.insert(maxima_.end(), cell.begin(), cell.end());
+    }
+  }
+
+  [[nodiscard]] bool fits(const BlobCenter& at) const {
+    const double reach = at.scale * kPatchReachScales * (options_.upright ? 1.0 : std::sqrt(2.0));
+    const cv::Size size = integral_.size_px();
+    return at.x_px >= reach && at.y_px >= reach && at.x_px + reach <= size.width - 1 &&
+           at.y_px + reach <= size.height - 1;
+  }
+
+  /// The strongest blobs whose patches lie within the image, dark ones first.
+  void locate() {
+    blobs_.clear();
+    for (const Maximum& m : maxima_) {
+      const auto at = pyramid_.refined(m);
+      if (!at || !fits(*at)) continue;
+      blobs_.push_back({m,
+                        {static_cast<float>(at->x_px), static_cast<float>(at->y_px),
+                         static_cast<float>(at->scale), 0.0F},
+                        false});
+    }
+    const auto by_strength = [](const Blob& a, const Blob& b) {
+      return stronger(a.maximum, b.maximum);
+    };
+    const auto budget = static_cast<std::size_t>(options_.max_keypoints);
+    if (blobs_.size() > budget) {
+      std::nth_element(blobs_.begin(), blobs_.begin() + static_cast<std::ptrdiff_t>(budget),
+                       blobs_.end(), by_strength);
+      blobs_.resize(budget);
+    }
+    for (Blob& blob : blobs_) blob.bright = pyramid_.is_bright(blob.maximum);
+    std::sort(blobs_.begin(), blobs_.end(), [&](const Blob& a, const Blob& b) {
+      return a.bright != b.bright ? b.bright : by_strength(a, b);
+    });
+  }
+
+  void describe(Features& features) {
+    features.working_size_px = integral_.size_px();
+    features.num_dark = static_cast<std::size_t>(
+        std::count_if(blobs_.begin(), blobs_.end(), [](const Blob& b) { return !b.bright; }));
+    features.keypoints.resize(blobs_.size());
+    features.descriptors.resize(blobs_.size());
+    for (std::size_t i = 0; i < blobs_.size(); ++i) {
+      Keypoint& keypoint = features.keypoints[i];
+      keypoint = blobs_[i].keypoint;
+      if (options_.upright) {
+        upright_patch(integral_, keypoint, kernels_, patch_);
+      } else {
+        keypoint.angle_rad = dominant_angle(integral_, keypoint);
+        turned_patch(integral_, keypoint, patch_);
+      }
+      kernels_.describe(patch_.data(), features.descriptors[i].data());
+    }
+  }
+
+  SurfOptions options_;
+  const Kernels& kernels_;
+  cv::Mat1b working_;
+  IntegralImage integral_;
+  HessianPyramid pyramid_;
+  std::vector<Maximum> maxima_;
+  std::vector<std::vector<Maximum>> cells_;
+  std::vector<Blob> blobs_;
+  Patch patch_{};
+};
+
+SurfExtractor::SurfExtractor(const SurfOptions& options, const Kernels& kernels)
+    : impl_(std::make_unique<Impl>(options, kernels)) {}
+SurfExtractor::~SurfExtractor() = default;
+SurfExtractor::SurfExtractor(SurfExtractor&&) noexcept = default;
+SurfExtractor& SurfExtractor::operator=(SurfExtractor&&) noexcept = default;
+
+void SurfExtractor::extract(const cv::Mat1b& gray, Features& features) {
+  impl_->extract(gray, features);
+}
+
+Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options) {
   Features features;
-  features.working_size_px = image.size();
-  features.num_dark =
-      static_cast<std::size_t>(std::count_if(points.begin(), points.end(), std::not_fn(is_bright)));
-  features.keypoints.reserve(points.size());
-  features.descriptors.reserve(points.size());
-  for (const auto& point : points) describe(integral, point, options.upright, features);
+  SurfExtractor(options).extract(gray, features);
   return features;
 }
 

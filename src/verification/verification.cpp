@@ -4,121 +4,30 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <limits>
-#include <span>
-
-#include <opencv2/calib3d.hpp>
 
 #include "loopbit/kernels.hpp"
+
+#include "epipolar_ransac.hpp"
+#include "feature_matcher.hpp"
 
 namespace loopbit {
 namespace {
 
 /// Seven matches always have an epipolar geometry, so only more can speak for one.
 constexpr std::size_t kMinMatchesForGeometry = 8;
-constexpr int kRansacIterations = 1000;
-constexpr double kRansacConfidence = 0.999;
-
-/// The nearest and second nearest neighbour of a feature, by squared distance.
-struct Nearest {
-  std::size_t index = 0;
-  std::int32_t distance_sq = std::numeric_limits<std::int32_t>::max();
-  std::int32_t second_distance_sq = std::numeric_limits<std::int32_t>::max();
-
-  void offer(std::size_t other, std::int32_t other_distance_sq) {
-    if (other_distance_sq < distance_sq) {
-      second_distance_sq = distance_sq;
-      distance_sq = other_distance_sq;
-      index = other;
-    } else if (other_distance_sq < second_distance_sq) {
-      second_distance_sq = other_distance_sq;
-    }
-  }
-
-  [[nodiscard]] bool is_distinct(double max_ratio) const {
-    return distance_sq < max_ratio * max_ratio * second_distance_sq;
-  }
-};
-
-std::vector<std::int32_t> squared_norms(std::span<const Descriptor> descriptors) {
-  std::vector<std::int32_t> norms;
-  norms.reserve(descriptors.size());
-  for (const Descriptor& d : descriptors) {
-    std::int32_t norm = 0;
-    active_kernels().dot_products(d.data(), d.data(), 1, &norm);
-    norms.push_back(norm);
-  }
-  return norms;
-}
-
-/// Appends the distinct mutual matches between two groups of descriptors, whose first members have
-/// the indices `first_query` and `first_place`.
-void match_group(std::span<const Descriptor> query, std::size_t first_query,
-                 std::span<const Descriptor> place, std::size_t first_place, double max_ratio,
-                 std::vector<Match>& matches) {
-  if (query.empty() || place.empty()) return;
-  const auto query_norms = squared_norms(query);
-  const auto place_norms = squared_norms(place);
-  std::vector<Nearest> of_query(query.size());
-  std::vector<Nearest> of_place(place.size());
-  std::vector<std::int32_t> products(place.size());
-  for (std::size_t q = 0; q < query.size(); ++q) {
-    active_kernels().dot_products(query[q].data(), place.front().data(), place.size(),
-                                  products.data());
-    for (std::size_t p = 0; p < place.size(); ++p) {
-      const std::int32_t distance_sq = query_norms[q] + place_norms[p] - 2 * products[p];
-      of_query[q].offer(p, distance_sq);
-      of_place[p].offer(q, distance_sq);
-    }
-  }
-  for (std::size_t q = 0; q < query.size(); ++q) {
-    const std::size_t p = of_query[q].index;
-    if (of_place[p].index != q) continue;
-    if (!of_query[q].is_distinct(max_ratio) || !of_place[p].is_distinct(max_ratio)) continue;
-    matches.push_back({static_cast<int>(first_query + q), static_cast<int>(first_place + p)});
-  }
-}
 
 const Keypoint& keypoint(const Features& features, int index) {
   return features.keypoints[static_cast<std::size_t>(index)];
 }
 
-std::vector<cv::Point2f> positions(const Features& features, const std::vector<Match>& matches,
-                                   int Match::*side) {
-  std::vector<cv::Point2f> points;
-  points.reserve(matches.size());
-  for (const Match& match : matches) {
-    const Keypoint& point = keypoint(features, match.*side);
-    points.emplace_back(point.x_px, point.y_px);
-  }
-  return points;
+EpipolarRansac::Pair pair_of(const Features& query, const Features& place, const Match& match) {
+  const Keypoint& a = keypoint(query, match.query);
+  const Keypoint& b = keypoint(place, match.place);
+  return {a.x_px, a.y_px, b.x_px, b.y_px};
 }
 
-std::vector<Match> ransac_inliers(const Features& query, const Features& place,
-                                  const std::vector<Match>& matches, double max_error_px) {
-  std::vector<std::uint8_t> is_inlier;
-  // MAGSAC++ (Barath et al., CVPR 2020); OpenCV seeds it with the same constant at every call.
-  cv::findFundamentalMat(positions(query, matches, &Match::query),
-                         positions(place, matches, &Match::place), cv::USAC_MAGSAC, max_error_px,
-                         kRansacConfidence, kRansacIterations, is_inlier);
-  std::vector<Match> inliers;
-  for (std::size_t i = 0; i < is_inlier.size(); ++i) {
-    if (is_inlier[i] != 0) inliers.push_back(matches[i]);
-  }
-  return inliers;
-}
-
-/// The matches that a camera standing where it stood would see: a geometry, too, but one that no
-/// fundamental matrix is determined by, so that RANSAC finds none.
-std::vector<Match> unmoved_matches(const Features& query, const Features& place,
-                                   std::vector<Match> matches, double max_error_px) {
-  std::erase_if(matches, [&](const Match& match) {
-    const Keypoint& a = keypoint(query, match.query);
-    const Keypoint& b = keypoint(place, match.place);
-    return std::hypot(a.x_px - b.x_px, a.y_px - b.y_px) > max_error_px;
-  });
-  return matches;
+float moved_px(const EpipolarRansac::Pair& pair) {
+  return std::hypot(pair.x1 - pair.x0, pair.y1 - pair.y0);
 }
 
 bool overlap(const Keypoint& a, const Keypoint& b, double min_spacing_scales) {
@@ -128,52 +37,117 @@ bool overlap(const Keypoint& a, const Keypoint& b, double min_spacing_scales) {
   return dx * dx + dy * dy < spacing * spacing;
 }
 
+/// What matches say about two views; keeps its memory from pair to pair.
+class Geometry {
+ public:
+  void find_inliers(const Features& query, const Features& place, std::span<const Match> matches,
+                    double max_error_px, std::vector<Match>& inliers) {
+    inliers.clear();
+    if (matches.size() < kMinMatchesForGeometry) return;
+    pairs_.clear();
+    for (const Match& match : matches) pairs_.push_back(pair_of(query, place, match));
+    // A camera standing where it stood has a geometry, too, but one that no fundamental matrix is
+    // determined by, so that RANSAC may find none.
+    const auto is_unmoved = [&](const auto& pair) { return moved_px(pair) <= max_error_px; };
+    const auto unmoved = std::count_if(pairs_.begin(), pairs_.end(), is_unmoved);
+    const bool has_moved = ransac_.find(pairs_, max_error_px) >= unmoved;
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (has_moved ? ransac_.is_inlier()[i] != 0 : is_unmoved(pairs_[i])) {
+        inliers.push_back(matches[i]);
+      }
+    }
+  }
+
+  int count_distinct(const Features& query, const Features& place, std::span<const Match> inliers,
+                     double min_spacing_scales) {
+    const auto repeats = [&](const Match& a, const Match& b) {
+      return overlap(keypoint(query, a.query), keypoint(query, b.query), min_spacing_scales) ||
+             overlap(keypoint(place, a.place), keypoint(place, b.place), min_spacing_scales);
+    };
+    distinct_.clear();
+    for (const Match& match : inliers) {
+      const bool is_new = std::none_of(distinct_.begin(), distinct_.end(),
+                                       [&](const Match& other) { return repeats(match, other); });
+      if (is_new) distinct_.push_back(match);
+    }
+    return static_cast<int>(distinct_.size());
+  }
+
+ private:
+  EpipolarRansac ransac_;
+  std::vector<EpipolarRansac::Pair> pairs_;
+  std::vector<Match> distinct_;
+};
+
 }  // namespace
 
+class Verifier::Impl {
+ public:
+  Impl(const VerificationOptions& options, const Kernels& kernels)
+      : options_(options), matcher_(kernels) {
+    validate(options, "verification");
+  }
+
+  void match(const Features& query, const Features& place, Verification& result) {
+    matcher_.match(query, place, options_.max_ratio, result.matches);
+    result.inliers.clear();
+    result.distinct_inliers = 0;
+  }
+
+  void find_geometry(const Features& query, const Features& place, Verification& result) {
+    result.inliers.clear();
+    result.distinct_inliers = 0;
+    if (result.matches.size() < static_cast<std::size_t>(options_.min_matches)) return;
+    geometry_.find_inliers(query, place, result.matches, options_.max_epipolar_error_px,
+                           result.inliers);
+    result.distinct_inliers =
+        geometry_.count_distinct(query, place, result.inliers, options_.min_spacing_scales);
+  }
+
+ private:
+  VerificationOptions options_;
+  FeatureMatcher matcher_;
+  Geometry geometry_;
+};
+
+Verifier::Verifier(const VerificationOptions& options, const Kernels& kernels)
+    : impl_(std::make_unique<Impl>(options, kernels)) {}
+Verifier::~Verifier() = default;
+Verifier::Verifier(Verifier&&) noexcept = default;
+Verifier& Verifier::operator=(Verifier&&) noexcept = default;
+
+void Verifier::match(const Features& query, const Features& place, Verification& result) {
+  impl_->match(query, place, result);
+}
+
+void Verifier::find_geometry(const Features& query, const Features& place, Verification& result) {
+  impl_->find_geometry(query, place, result);
+}
+
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio) {
-  static_assert(sizeof(Descriptor) == kDescriptorSize);
-  const std::span<const Descriptor> of_query = query.descriptors;
-  const std::span<const Descriptor> of_place = place.descriptors;
   std::vector<Match> matches;
-  match_group(of_query.first(query.num_dark), 0, of_place.first(place.num_dark), 0, max_ratio,
-              matches);
-  match_group(of_query.subspan(query.num_dark), query.num_dark, of_place.subspan(place.num_dark),
-              place.num_dark, max_ratio, matches);
+  FeatureMatcher(active_kernels()).match(query, place, max_ratio, matches);
   return matches;
 }
 
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
                                     const std::vector<Match>& matches, double max_error_px) {
-  if (matches.size() < kMinMatchesForGeometry) return {};
-  auto moved = ransac_inliers(query, place, matches, max_error_px);
-  auto unmoved = unmoved_matches(query, place, matches, max_error_px);
-  return unmoved.size() > moved.size() ? unmoved : moved;
+  std::vector<Match> inliers;
+  Geometry().find_inliers(query, place, matches, max_error_px, inliers);
+  return inliers;
 }
 
 int distinct_inliers(const Features& query, const Features& place,
                      const std::vector<Match>& inliers, double min_spacing_scales) {
-  const auto repeats = [&](const Match& a, const Match& b) {
-    return overlap(keypoint(query, a.query), keypoint(query, b.query), min_spacing_scales) ||
-           overlap(keypoint(place, a.place), keypoint(place, b.place), min_spacing_scales);
-  };
-  std::vector<Match> distinct;
-  for (const Match& match : inliers) {
-    const bool is_new = std::none_of(distinct.begin(), distinct.end(),
-                                     [&](const Match& other) { return repeats(match, other); });
-    if (is_new) distinct.push_back(match);
-  }
-  return static_cast<int>(distinct.size());
+  return Geometry().count_distinct(query, place, inliers, min_spacing_scales);
 }
 
 Verification verify(const Features& query, const Features& place,
                     const VerificationOptions& options) {
-  validate(options, "verification");
+  Verifier verifier(options);
   Verification result;
-  result.matches = match_features(query, place, options.max_ratio);
-  if (result.matches.size() < static_cast<std::size_t>(options.min_matches)) return result;
-  result.inliers = epipolar_inliers(query, place, result.matches, options.max_epipolar_error_px);
-  result.distinct_inliers =
-      distinct_inliers(query, place, result.inliers, options.min_spacing_scales);
+  verifier.match(query, place, result);
+  verifier.find_geometry(query, place, result);
   return result;
 }
 

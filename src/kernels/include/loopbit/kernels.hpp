@@ -14,8 +14,47 @@ inline constexpr std::size_t kContentWords = 64;
 /// 8-bit values in one descriptor.
 inline constexpr std::size_t kDescriptorSize = 64;
 
-/// The two inner loops that decide the speed of loopbit, for one instruction set. All of them
-/// return the same integers; the scalar one is the reference.
+/// What one 8-bit descriptor value counts: a unit-length descriptor has the length 254.
+inline constexpr float kDescriptorScale = 254.0F;
+/// A descriptor is made of 20 x 20 samples, each of which spans 2 x 2 of 21 x 21 cells.
+inline constexpr std::size_t kSamples = 20;
+inline constexpr std::size_t kCells = kSamples + 1;
+/// Cells in memory: rows of 21 and padding.
+inline constexpr std::size_t kCellStride = 24;
+
+/// Hessian responses are computed in runs of at most so many samples.
+inline constexpr std::ptrdiff_t kHessianRun = 128;
+
+/// An integral image whose rows have the even columns first, then the odd ones: corner (row, 2 i)
+/// is corners[row * stride + i], corner (row, 2 i + 1) lies `half` further.
+struct IntegralView {
+  const std::uint32_t* corners = nullptr;
+  std::ptrdiff_t stride = 0;
+  std::ptrdiff_t half = 0;
+};
+
+/// Where the cells of one descriptor meet, for a grid parallel to the image.
+struct CellGrid {
+  const std::uint32_t* rows[kCells + 1];  ///< rows of the integral image
+  std::int32_t columns[kCellStride + 1];  ///< offsets in them; those after kCells + 1 repeat
+  float inverse_heights[kCells];          ///< of the cells, in pixels
+  float inverse_widths[kCellStride];
+};
+
+/// Descriptors whose neighbours are sought at once.
+inline constexpr std::size_t kMatchLanes = 16;
+
+/// The neighbours of kMatchLanes descriptors by squared distance; of equals, the first is nearest.
+struct NearestTwo {
+  static constexpr std::int32_t kNone = 0x7fffffff;
+
+  alignas(64) std::int32_t index[kMatchLanes];
+  alignas(64) std::int32_t distance_sq[kMatchLanes];         ///< kNone if there is no other
+  alignas(64) std::int32_t second_distance_sq[kMatchLanes];  ///< kNone if there is only one
+};
+
+/// The inner loops that decide the speed of loopbit, for one instruction set. All of them return
+/// the same bits; the scalar one is the reference.
 struct Kernels {
   std::string_view name;
 
@@ -25,9 +64,23 @@ struct Kernels {
                        const std::uint64_t* places, std::size_t num_places,
                        std::uint16_t* overlaps);
 
-  /// products[i] = dot(descriptor, descriptors[i]), each descriptor 64 signed bytes in [-127, 127].
-  void (*dot_products)(const std::int8_t* descriptor, const std::int8_t* descriptors,
-                       std::size_t num_descriptors, std::int32_t* products);
+  /// constants[i] = what this variant's nearest_two has to know of the i-th descriptor.
+  void (*describe_constants)(const std::int8_t* descriptors, std::size_t num_descriptors,
+                             std::int32_t* constants);
+
+  /// The nearest and second nearest of `others` for each of 16 descriptors. `constants` belong to
+  /// `others`. Cost: 16 * num_others products of 64 values.
+  void (*nearest_two)(const std::int8_t* descriptors, const std::int8_t* others,
+                      const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest);
+
+  void (*integral_row)(const std::uint8_t* pixels, std::size_t width, std::uint32_t* column_sums,
+                       std::uint32_t* even, std::uint32_t* odd);
+  void (*hessian_row)(const IntegralView& integral, std::ptrdiff_t y, std::ptrdiff_t first,
+                      std::ptrdiff_t count, std::ptrdiff_t lobe, float* responses);
+  void (*maxima_row)(const float* const* layers, std::ptrdiff_t stride, std::ptrdiff_t count,
+                     float min_response, std::uint8_t* is_maximum);
+  void (*cell_means)(const CellGrid& grid, float* cells);
+  void (*describe)(const float* cells, std::int8_t* descriptor);
 };
 
 /// The kernels this processor can run, slowest first: "scalar", "avx2", "avx512".

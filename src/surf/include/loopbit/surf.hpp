@@ -5,11 +5,13 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <tuple>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
+#include "loopbit/kernels.hpp"
 #include "loopbit/options.hpp"
 
 namespace loopbit {
@@ -36,7 +38,7 @@ struct Features {
 
 struct SurfOptions {
   int working_side_px = 640;
-  int max_keypoints = 700;
+  int max_keypoints = 600;
   bool upright = true;
 
   static constexpr auto fields() {
@@ -50,6 +52,24 @@ struct SurfOptions {
         switch_field("upright", &S::upright,
                      "features do not turn with the image: for cameras that stay level")};
   }
+};
+
+/// Extracts features from image after image, and keeps its working memory in between.
+class SurfExtractor {
+ public:
+  explicit SurfExtractor(const SurfOptions& options = {},
+                         const Kernels& kernels = active_kernels());
+  ~SurfExtractor();
+  SurfExtractor(const SurfExtractor&) = delete;
+  SurfExtractor& operator=(const SurfExtractor&) = delete;
+  SurfExtractor(SurfExtractor&&) noexcept;
+  SurfExtractor& operator=(SurfExtractor&&) noexcept;
+
+  void extract(const cv::Mat1b& gray, Features& features);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 /// SURF features of `gray`, 8 bits, at least 32 x 32 pixels.

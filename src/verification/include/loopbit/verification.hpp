@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <memory>
 #include <tuple>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
+#include "loopbit/kernels.hpp"
 #include "loopbit/options.hpp"
 #include "loopbit/surf.hpp"
 
@@ -65,6 +67,31 @@ std::vector<Match> epipolar_inliers(const Features& query, const Features& place
 /// crossing) has many of them, so they are not independent evidence.
 int distinct_inliers(const Features& query, const Features& place,
                      const std::vector<Match>& inliers, double min_spacing_scales);
+
+/// Step 3 for one pair after another in two halves, so that the second can be left out. Its memory
+/// is kept: once it has seen the largest pair, nothing is allocated but what `result` lacks. Not
+/// thread-safe; use one a thread.
+class Verifier {
+ public:
+  /// Throws Error (kind option) if `options` are not valid.
+  explicit Verifier(const VerificationOptions& options = {},
+                    const Kernels& kernels = active_kernels());
+  ~Verifier();
+  Verifier(const Verifier&) = delete;
+  Verifier& operator=(const Verifier&) = delete;
+  Verifier(Verifier&&) noexcept;
+  Verifier& operator=(Verifier&&) noexcept;
+
+  /// Sets `result.matches` (see match_features) and clears the rest.
+  void match(const Features& query, const Features& place, Verification& result);
+
+  /// Sets the rest from `result.matches`; leaves it empty where they are fewer than min_matches.
+  void find_geometry(const Features& query, const Features& place, Verification& result);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
 
 /// Step 3 for one candidate: match_features, epipolar_inliers, distinct_inliers.
 Verification verify(const Features& query, const Features& place,

@@ -1,0 +1,219 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "surf_quality.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "loopbit/surf.hpp"
+#include "loopbit/verification.hpp"
+
+#include "surf_peers.hpp"
+
+namespace loopbit::bench {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kWorkingSide = 640;
+constexpr int kOrbKeypoints = 1000;
+
+/// What one method makes of two images.
+struct Outcome {
+  std::vector<cv::Point2f> first;
+  std::vector<cv::Point2f> second;
+  std::size_t inliers = 0;
+};
+using Method = std::function<Outcome(const cv::Mat1b&, const cv::Mat1b&, bool upright)>;
+
+cv::Mat1b read(const fs::path& path) {
+  const cv::Mat1b image = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
+  const double factor = static_cast<double>(kWorkingSide) / std::max(image.cols, image.rows);
+  cv::Mat resized;
+  cv::resize(image, resized, {cvRound(image.cols * factor), cvRound(image.rows * factor)}, 0, 0,
+             cv::INTER_AREA);
+  return resized;
+}
+
+std::vector<cv::Point2f> points_of(const Features& features) {
+  std::vector<cv::Point2f> points;
+  for (const Keypoint& keypoint : features.keypoints) {
+    points.emplace_back(keypoint.x_px, keypoint.y_px);
+  }
+  return points;
+}
+
+Outcome compare(const Features& a, const Features& b) {
+  return {points_of(a), points_of(b), verify(a, b).inliers.size()};
+}
+
+Outcome ours(const cv::Mat1b& a, const cv::Mat1b& b, bool upright) {
+  const SurfOptions options{.upright = upright};
+  return compare(extract_surf(a, options), extract_surf(b, options));
+}
+
+Outcome dlibs(const cv::Mat1b& a, const cv::Mat1b& b, bool upright) {
+  const int budget = SurfOptions().max_keypoints;
+  return compare(dlib_surf(a, budget, upright), dlib_surf(b, budget, upright));
+}
+
+/// Mutual matches that pass the ratio test from either side, as match_features has them.
+std::vector<Match> match_orb(const OrbFeatures& a, const OrbFeatures& b) {
+  const cv::BFMatcher matcher(cv::NORM_HAMMING);
+  std::vector<std::vector<cv::DMatch>> there;
+  std::vector<std::vector<cv::DMatch>> back;
+  matcher.knnMatch(a.descriptors, b.descriptors, there, 2);
+  matcher.knnMatch(b.descriptors, a.descriptors, back, 2);
+  const auto is_distinct = [](const std::vector<cv::DMatch>& two) {
+    return two.size() == 2 && two[0].distance < 0.8F * two[1].distance;
+  };
+  std::vector<Match> matches;
+  for (const auto& two : there) {
+    if (!is_distinct(two)) continue;
+    const auto& of_place = back[static_cast<std::size_t>(two[0].trainIdx)];
+    if (!is_distinct(of_place) || of_place[0].trainIdx != two[0].queryIdx) continue;
+    matches.push_back({two[0].queryIdx, two[0].trainIdx});
+  }
+  return matches;
+}
+
+Features positions_of(const OrbFeatures& orb) {
+  Features features;
+  for (const cv::KeyPoint& keypoint : orb.keypoints) {
+    features.keypoints.push_back({.x_px = keypoint.pt.x, .y_px = keypoint.pt.y});
+  }
+  return features;
+}
+
+Outcome orbs(const cv::Mat1b& a, const cv::Mat1b& b, bool /*upright*/) {
+  const OrbFeatures of_a = orb(a, kOrbKeypoints);
+  const OrbFeatures of_b = orb(b, kOrbKeypoints);
+  const Features at_a = positions_of(of_a);
+  const Features at_b = positions_of(of_b);
+  return {points_of(at_a), points_of(at_b),
+          epipolar_inliers(at_a, at_b, match_orb(of_a, of_b), 2.0).size()};
+}
+
+struct Case {
+  std::string name;
+  std::vector<std::pair<fs::path, fs::path>> pairs{};
+  bool upright = true;
+  std::optional<cv::Matx33d> homography = std::nullopt;  ///< first to second, pixels of the files
+};
+
+cv::Matx33d read_homography(const fs::path& path) {
+  cv::Matx33d h;
+  std::ifstream file(path);
+  for (double& value : h.val) file >> value;
+  return h;
+}
+
+std::vector<Case> cases(const fs::path& data) {
+  std::vector<Case> all;
+  for (int k = 2; k <= 6; ++k) {
+    all.push_back({fmt::format("graf 1-{}", k),
+                   {{data / "graf/img1.png", data / fmt::format("graf/img{}.png", k)}},
+                   false,
+                   read_homography(data / fmt::format("graf/H1to{}p", k))});
+  }
+  Case stereo{.name = "kitti00_stereo"};
+  for (const char* frame : {"000000", "001000", "002000"}) {
+    stereo.pairs.emplace_back(data / fmt::format("kitti00_stereo/{}_live.png", frame),
+                              data / fmt::format("kitti00_stereo/{}_memory.png", frame));
+  }
+  all.push_back(stereo);
+  Case euroc{.name = "euroc_pairs, stereo"};
+  for (int i = 0; i < 4; ++i) {
+    euroc.pairs.emplace_back(data / fmt::format("euroc_pairs/left_img_{}.png", i),
+                             data / fmt::format("euroc_pairs/right_img_{}.png", i));
+  }
+  all.push_back(euroc);
+  all.push_back(
+      {.name = "euroc_pairs, large change of view",
+       .pairs = {{data / "euroc_pairs/left_img_0.png", data / "euroc_pairs/left_img_1.png"},
+                 {data / "euroc_pairs/left_img_2.png", data / "euroc_pairs/left_img_3.png"}}});
+  std::vector<fs::path> drive;
+  for (const auto& entry : fs::directory_iterator(data / "kitti03/images")) {
+    drive.push_back(entry.path());
+  }
+  std::sort(drive.begin(), drive.end());
+  for (const std::size_t gap : {2U, 5U, 10U}) {
+    Case apart{.name = fmt::format("kitti03, {} frames apart", gap)};
+    for (std::size_t i = 0; i + gap < drive.size(); i += 20) {
+      apart.pairs.emplace_back(drive[i], drive[i + gap]);
+    }
+    all.push_back(apart);
+  }
+  return all;
+}
+
+/// See print_quality.
+double repeatability(const Outcome& outcome, const cv::Matx33d& h, cv::Size size) {
+  const auto mapped = [](const cv::Matx33d& m, cv::Point2f p) {
+    const cv::Vec3d v = m * cv::Vec3d(p.x, p.y, 1);
+    return cv::Point2f(static_cast<float>(v[0] / v[2]), static_cast<float>(v[1] / v[2]));
+  };
+  const cv::Rect2f frame({0, 0}, cv::Size2f(size));
+  std::vector<cv::Point2f> first;
+  for (const cv::Point2f& p : outcome.first) {
+    if (const auto q = mapped(h, p); frame.contains(q)) first.push_back(q);
+  }
+  std::vector<cv::Point2f> second;
+  const cv::Matx33d back = h.inv();
+  for (const cv::Point2f& p : outcome.second) {
+    if (frame.contains(mapped(back, p))) second.push_back(p);
+  }
+  const std::size_t fewer = std::min(first.size(), second.size());
+  std::size_t met = 0;
+  for (const cv::Point2f& p : first) {
+    const auto nearest = std::min_element(second.begin(), second.end(), [&](auto a, auto b) {
+      return cv::norm(a - p) < cv::norm(b - p);
+    });
+    if (nearest == second.end() || cv::norm(*nearest - p) > 2.0) continue;
+    second.erase(nearest);
+    ++met;
+  }
+  return fewer == 0 ? 0.0 : static_cast<double>(met) / static_cast<double>(fewer);
+}
+
+std::string measure(const Case& pairs, const Method& method) {
+  double inliers = 0;
+  double repeated = 0;
+  for (const auto& [a, b] : pairs.pairs) {
+    const cv::Mat1b first = read(a);
+    const Outcome outcome = method(first, read(b), pairs.upright);
+    inliers += static_cast<double>(outcome.inliers);
+    if (pairs.homography) {
+      const double side = std::max(cv::imread(a.string()).cols, cv::imread(a.string()).rows);
+      const double factor = kWorkingSide / side;
+      const cv::Matx33d scale = cv::Matx33d::diag({factor, factor, 1.0});
+      repeated = repeatability(outcome, scale * *pairs.homography * scale.inv(), first.size());
+    }
+  }
+  const std::string mean = fmt::format("{:.1f}", inliers / static_cast<double>(pairs.pairs.size()));
+  return pairs.homography ? fmt::format("{} ({:.3f})", mean, repeated) : mean;
+}
+
+}  // namespace
+
+void print_quality(const fs::path& data) {
+  fmt::print(
+      "\nMean inliers (repeatability) by pair; {} keypoints, ORB {}\n{:36} {:>16} {:>16} {:>16}\n",
+      SurfOptions().max_keypoints, kOrbKeypoints, "pairs", "loopbit", "dlib", "ORB");
+  for (const Case& pairs : cases(data)) {
+    fmt::print("{:36} {:>16} {:>16} {:>16}\n", pairs.name, measure(pairs, ours),
+               measure(pairs, dlibs), measure(pairs, orbs));
+  }
+}
+
+}  // namespace loopbit::bench

@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "loopbit/kernels.hpp"
+#include "loopbit/verification.hpp"
+
+namespace loopbit {
+
+/// match_features() with memory that is kept from pair to pair.
+class FeatureMatcher {
+ public:
+  explicit FeatureMatcher(const Kernels& kernels) : kernels_(kernels) {}
+
+  void match(const Features& query, const Features& place, double max_ratio,
+             std::vector<Match>& matches);
+
+ private:
+  using Descriptors = std::span<const Descriptor>;
+
+  void match_group(Descriptors query, Descriptors place, double max_ratio);
+  void find_one_way(Descriptors query, Descriptors place, double max_ratio);
+  void keep_mutual(Descriptors query, Descriptors place, double max_ratio);
+  void find_constants(Descriptors descriptors);
+
+  const Kernels& kernels_;
+  std::vector<std::int32_t> constants_;
+  std::vector<Match> matches_;  ///< of one group, numbered from its first descriptors
+};
+
+}  // namespace loopbit
