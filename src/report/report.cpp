@@ -257,7 +257,9 @@ std::string report_json(const std::vector<ReportRun>& runs, const ReportOptions&
   constexpr double kBytesPerMb = 1e6;
   const double max_bytes = options.max_pictures_mb * kBytesPerMb /
                            static_cast<double>(std::max<std::size_t>(1, runs.size()));
-  Json json{{"loopbit", kVersion}, {"runs", Json::array()}};
+  Json json{{"loopbit", kVersion},
+            {"default_options", Json::parse(to_json(LoopDetectorOptions{}))},
+            {"runs", Json::array()}};
   for (const ReportRun& run : runs) {
     json["runs"].push_back(run_json(run, static_cast<std::size_t>(max_bytes)));
   }

@@ -7,12 +7,29 @@
 //                   [--no-pictures] [--no-loops] [--external] [--unreadable] [--pictures-mb MB]
 import { readFileSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
-import { contentAt, distance_m, evidenceAt, lap_m, pngOf, positionAt, random, similarity } from "./sample_world.mjs";
+import {
+  contentAt,
+  distance_m,
+  evidenceAt,
+  lap_m,
+  pngOf,
+  positionAt,
+  random,
+  similarity,
+} from "./sample_world.mjs";
 
 const kTolerance = 4;
 const kThreshold = 18;
 const kMaxSide = 640;
-const kStatuses = ["loop", "no_earlier_place", "no_similar_place", "few_matches", "no_geometry", "low_score", "unreadable"];
+const kStatuses = [
+  "loop",
+  "no_earlier_place",
+  "no_similar_place",
+  "few_matches",
+  "no_geometry",
+  "low_score",
+  "unreadable",
+];
 const kSteps = ["content", "retrieval", "features", "verification"];
 
 const statusOf = (name) => kStatuses.indexOf(name);
@@ -63,7 +80,8 @@ function detect(places, quality, options, next) {
     const isAstray = !isRevisit || next() > 0.93 + 0.06 * quality;
     const anywhere = Math.floor(next() * Math.max(1, frame - frames / 20));
     const match = isAstray ? anywhere : Math.max(0, Math.min(frame - 1, frame - lap + jitter));
-    const strength = isRevisit && !isAstray ? 12 + 60 * quality * next() ** 1.5 + 8 : 15 * next() ** 2;
+    const strength =
+      isRevisit && !isAstray ? 12 + 60 * quality * next() ** 1.5 + 8 : 15 * next() ** 2;
     const score = isAstray && isRevisit && next() < 0.2 ? 19.5 : round(strength, 1);
     const isNothing = isUnreadable || isEarly;
     columns.match.push(isNothing ? -1 : match);
@@ -72,7 +90,9 @@ function detect(places, quality, options, next) {
     columns.matches.push(isNothing ? 0 : Math.floor(score * 1.4 + 8));
     const low = score < 4 ? "few_matches" : score < 7 ? "no_geometry" : "low_score";
     const judged = score >= kThreshold ? "loop" : low;
-    columns.status.push(statusOf(isUnreadable ? "unreadable" : isEarly ? "no_earlier_place" : judged));
+    columns.status.push(
+      statusOf(isUnreadable ? "unreadable" : isEarly ? "no_earlier_place" : judged),
+    );
   }
   return columns;
 }
@@ -130,7 +150,10 @@ function evaluationOf(columns, verdicts, truth) {
     average_precision += precision * (recall - before);
     before = recall;
   }
-  const pairs = truth.same_place.reduce((sum, last, i, t) => (i % 3 === 2 ? sum + last - t[i - 1] + 1 : sum), 0);
+  const pairs = truth.same_place.reduce(
+    (sum, last, i, t) => (i % 3 === 2 ? sum + last - t[i - 1] + 1 : sum),
+    0,
+  );
   return {
     protocol: null,
     positives,
@@ -144,7 +167,13 @@ function evaluationOf(columns, verdicts, truth) {
     recall_at_full_precision: full?.recall ?? 0,
     score_at_full_precision: full?.score ?? null,
     average_precision,
-    pairs: { positives: pairs, right, wrong, recall: pairs === 0 ? 0 : right / pairs, precision: 1 },
+    pairs: {
+      positives: pairs,
+      right,
+      wrong,
+      recall: pairs === 0 ? 0 : right / pairs,
+      precision: 1,
+    },
     curve,
   };
 }
@@ -152,8 +181,15 @@ function evaluationOf(columns, verdicts, truth) {
 function timesOf(frames, slowness, next) {
   const tail = () => 1 + (next() < 0.03 ? 1.2 * next() : 0.15 * next());
   const of = (base, growth) =>
-    Array.from({ length: frames }, (_, i) => round((base + (growth * i) / frames) * slowness * tail(), 3));
-  return { content: of(0.4, 0), retrieval: of(0.02, 0.5), features: of(14, 0), verification: of(1, 13) };
+    Array.from({ length: frames }, (_, i) =>
+      round((base + (growth * i) / frames) * slowness * tail(), 3),
+    );
+  return {
+    content: of(0.4, 0),
+    retrieval: of(0.02, 0.5),
+    features: of(14, 0),
+    verification: of(1, 13),
+  };
 }
 
 function summaryOf(times) {
@@ -164,7 +200,8 @@ function summaryOf(times) {
 }
 
 function recordOf(columns, times, frames) {
-  const readable = (of) => of.filter((_, frame) => columns.status[frame] !== statusOf("unreadable"));
+  const readable = (of) =>
+    of.filter((_, frame) => columns.status[frame] !== statusOf("unreadable"));
   const total = times.content.map((_, i) => kSteps.reduce((sum, step) => sum + times[step][i], 0));
   const all = Object.fromEntries(kSteps.map((step) => [step, summaryOf(readable(times[step]))]));
   const by_status = Object.fromEntries(
@@ -173,7 +210,12 @@ function recordOf(columns, times, frames) {
   const wall_s = (total.reduce((sum, time) => sum + time, 0) / 1000) * 1.1;
   return {
     loopbit: "0.1.0",
-    input: { path: "street/images", description: `${frames} images in street/images`, every: 1, limit: 0 },
+    input: {
+      path: "street/images",
+      description: `${frames} images in street/images`,
+      every: 1,
+      limit: 0,
+    },
     stopped_by: "end",
     options: {
       binary_content: { gamma: 1.5, blur_sigma_px: 2.5 },
@@ -181,7 +223,12 @@ function recordOf(columns, times, frames) {
       surf: { max_keypoints: 700, upright: true },
       decision: { min_score: kThreshold },
     },
-    machine: { processor: "A made-up processor", cores: 2, kernel: "avx2", system: "Linux 6.1.0 x86_64" },
+    machine: {
+      processor: "A made-up processor",
+      cores: 2,
+      kernel: "avx2",
+      system: "Linux 6.1.0 x86_64",
+    },
     threads: 1,
     counts: { frames, by_status },
     times_ms: { ...all, total: summaryOf(readable(total)) },
@@ -248,7 +295,9 @@ function runOf(places, index, options) {
   };
   const positions = places.map(positionAt);
   return {
-    name: isExternal ? "another detector" : ["street", "street, fewer keypoints", "street, third"][index],
+    name: isExternal
+      ? "another detector"
+      : ["street", "street, fewer keypoints", "street, third"][index],
     record: isExternal ? null : recordOf(columns, times_ms, frames),
     threshold: isExternal ? null : kThreshold,
     frames,
@@ -257,7 +306,9 @@ function runOf(places, index, options) {
     status: isExternal ? columns.status.map((status) => (status === 0 ? 0 : 1)) : columns.status,
     match: columns.match,
     score: columns.score,
-    similarity: isExternal ? null : columns.match.map((match, frame) => round(similarityOf(match, frame), 6)),
+    similarity: isExternal
+      ? null
+      : columns.match.map((match, frame) => round(similarityOf(match, frame), 6)),
     matches: isExternal ? null : columns.matches,
     inliers: isExternal ? null : columns.inliers,
     times_ms,
@@ -268,7 +319,9 @@ function runOf(places, index, options) {
       ? { x_m: positions.map(({ x }) => round(x, 4)), y_m: positions.map(({ y }) => round(y, 4)) }
       : null,
     similarity_matrix: hasContents ? matrixOf(places, contents) : null,
-    pictures: hasContents ? picturesOf(places, columns, truth, (1e6 * options.picturesMb) / options.runs) : {},
+    pictures: hasContents
+      ? picturesOf(places, columns, truth, (1e6 * options.picturesMb) / options.runs)
+      : {},
   };
 }
 

@@ -93,19 +93,28 @@ export function pngOf(grey, width, height) {
   header.writeUInt32BE(height, 4);
   header.set([8, 0, 0, 0, 0], 8);
   const rows = Buffer.alloc((width + 1) * height);
-  for (let y = 0; y < height; ++y) rows.set(grey.subarray(y * width, (y + 1) * width), y * (width + 1) + 1);
+  for (let y = 0; y < height; ++y)
+    rows.set(grey.subarray(y * width, (y + 1) * width), y * (width + 1) + 1);
   const signature = Buffer.from([0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a]);
-  const parts = [chunk("IHDR", header), chunk("IDAT", deflateSync(rows)), chunk("IEND", Buffer.alloc(0))];
+  const parts = [
+    chunk("IHDR", header),
+    chunk("IDAT", deflateSync(rows)),
+    chunk("IEND", Buffer.alloc(0)),
+  ];
   return Buffer.concat([signature, ...parts]).toString("base64");
 }
 
 function fillPosts(pixels, width, height, seen, value) {
   for (const post of seen) {
     const left = Math.max(0, Math.round((post.x - post.width / 2) * width));
-    const right = Math.min(width, Math.max(left + 1, Math.round((post.x + post.width / 2) * width)));
+    const right = Math.min(
+      width,
+      Math.max(left + 1, Math.round((post.x + post.width / 2) * width)),
+    );
     const top = Math.max(0, Math.round(post.top * height));
     const bottom = Math.min(height, Math.round(post.bottom * height));
-    for (let y = top; y < bottom; ++y) pixels.fill(value(post), y * width + left, y * width + right);
+    for (let y = top; y < bottom; ++y)
+      pixels.fill(value(post), y * width + left, y * width + right);
   }
 }
 
@@ -113,9 +122,19 @@ function pictureOf(seen) {
   const pixels = new Uint8Array(kWidth_px * kHeight_px);
   for (let y = 0; y < kHeight_px; ++y) {
     const isSky = y < kHeight_px / 2;
-    pixels.fill(isSky ? 232 - y / 3 : 130 + (y - kHeight_px / 2) / 2, y * kWidth_px, (y + 1) * kWidth_px);
+    pixels.fill(
+      isSky ? 232 - y / 3 : 130 + (y - kHeight_px / 2) / 2,
+      y * kWidth_px,
+      (y + 1) * kWidth_px,
+    );
   }
-  fillPosts(pixels, kWidth_px, kHeight_px, seen, ({ grey, ahead_m }) => grey + (2 * (200 - grey) * ahead_m) / 100);
+  fillPosts(
+    pixels,
+    kWidth_px,
+    kHeight_px,
+    seen,
+    ({ grey, ahead_m }) => grey + (2 * (200 - grey) * ahead_m) / 100,
+  );
   return pngOf(pixels, kWidth_px, kHeight_px);
 }
 
@@ -150,7 +169,9 @@ function inliersOf(place, other) {
   const seen = new Map(seenFrom(other).map((post) => [post.id, post]));
   const numbers = seenFrom(place).flatMap((post) => {
     const same = seen.get(post.id);
-    return same ? [post.x, post.top, same.x, same.top, post.x, post.bottom, same.x, same.bottom] : [];
+    return same
+      ? [post.x, post.top, same.x, same.top, post.x, post.bottom, same.x, same.bottom]
+      : [];
   });
   return Buffer.from(Float32Array.from(numbers.map((x) => Math.min(1, Math.max(0, x)))).buffer);
 }

@@ -1,11 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 import { createHash } from "node:crypto";
+import { readFileSync } from "node:fs";
 import type { Plugin } from "vite";
 
 const kDataPlace = "@REPORT_DATA@";
 
 const hash = (text: string) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
+
+/** What MIT asks of copies: the notice of the library that is built into the page. */
+const license = () =>
+  `<!-- Contains uPlot:\n${readFileSync("node_modules/uplot/LICENSE", "utf8").trim()}\n-->`;
 
 /** The page may run and wear exactly what was built into it, and ask nothing of any network. */
 function policy(script: string, style: string): string {
@@ -48,6 +53,7 @@ export function oneFile(): Plugin {
       html = replaceOnce(html, /<script type="module"[^>]*><\/script>/, "");
       html = replaceOnce(html, /<link rel="stylesheet"[^>]*>/, `<style>${style}</style>`);
       html = replaceOnce(html, /@POLICY@/, policy(script, style));
+      html = replaceOnce(html, /<\/head>/, `${license()}\n</head>`);
       html = replaceOnce(html, /<\/body>/, `<script type="module">${script}</script>\n</body>`);
       if (html.split(kDataPlace).length !== 2) {
         throw new Error(`the page needs exactly one ${kDataPlace}`);

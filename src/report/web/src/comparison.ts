@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
-import { button, html } from "./dom.ts";
+import { button, html, renew } from "./dom.ts";
 import * as format from "./format.ts";
 import { lineOf } from "./run_lines.ts";
 import type { RunModel } from "./run_model.ts";
@@ -86,57 +86,77 @@ function bestOf(column: Column, models: readonly RunModel[]): number | null {
 }
 
 /** One row a run; the header sorts, the name of a run shows it. */
-export function comparison(store: Store, models: readonly RunModel[]) {
-  const head = html("tr");
-  const body = html("tbody");
-  let sorted: { column: Column; direction: 1 | -1 } | null = null;
+export class Comparison {
+  readonly element: HTMLElement;
+  private readonly body = html("tbody");
+  private readonly heads = new Map<Column, HTMLElement>();
+  private sorted: { column: Column; direction: 1 | -1 } | null = null;
 
-  const order = () => {
-    const rows = models.map((model, index) => ({ model, index }));
-    const by = sorted;
-    if (by) {
-      const value = (model: RunModel) => by.column.value(model) ?? Number.NEGATIVE_INFINITY;
-      rows.sort((a, b) => by.direction * (value(a.model) - value(b.model)));
+  constructor(
+    private readonly store: Store,
+    private readonly models: readonly RunModel[],
+  ) {
+    for (const column of kColumns) {
+      const sort = button({}, () => this.sortBy(column), column.name);
+      this.heads.set(column, html("th", { scope: "col" }, sort));
     }
-    return rows;
-  };
+    const what =
+      "The runs side by side; the best of each column is bold. Choose a run to see it below.";
+    const head = html("tr", {}, html("th", { scope: "col" }, "run"), ...this.heads.values());
+    const parts = [html("caption", {}, what), html("thead", {}, head), this.body];
+    this.element = html(
+      "div",
+      { class: "scroll", tabindex: 0, role: "region", "aria-label": "Comparison of the runs" },
+      html("table", { class: "numbers comparison" }, ...parts),
+    );
+  }
 
-  const sortBy = (column: Column) => {
-    const first = column.best === "low" ? 1 : -1;
-    const direction = sorted?.column === column ? (sorted.direction === 1 ? -1 : 1) : first;
-    sorted = { column, direction };
-    show();
-  };
-
-  const heads = kColumns.map((column) => ({
-    column,
-    cell: html(
-      "th",
-      { scope: "col" },
-      button({}, () => sortBy(column), column.name),
-    ),
-  }));
-
-  const show = () => {
-    for (const { column, cell } of heads) {
-      const direction = sorted?.column === column ? sorted.direction : 0;
+  show(): void {
+    for (const [column, cell] of this.heads) {
+      const direction = this.sorted?.column === column ? this.sorted.direction : 0;
       const name = direction === 0 ? "none" : direction === 1 ? "ascending" : "descending";
       cell.setAttribute("aria-sort", name);
     }
-    body.replaceChildren(...order().map(({ model, index }) => row(model, index)));
-  };
+    const rows = this.order().map((index) => this.row(index));
+    renew(
+      this.body,
+      rows.filter((row) => row !== null),
+    );
+  }
 
-  const row = (model: RunModel, index: number) => {
-    const isShown = index === store.now.run;
+  /** The best comes first; the second time last. */
+  private sortBy(column: Column): void {
+    const first = column.best === "low" ? 1 : -1;
+    const isAgain = this.sorted?.column === column && this.sorted.direction === first;
+    this.sorted = { column, direction: isAgain ? (first === 1 ? -1 : 1) : first };
+    this.show();
+  }
+
+  /** The indices of the runs as they are shown. */
+  private order(): number[] {
+    const indices = this.models.map((_, index) => index);
+    const sorted = this.sorted;
+    if (!sorted) return indices;
+    const value = (index: number) => {
+      const model = this.models[index];
+      return (model && sorted.column.value(model)) ?? Number.NEGATIVE_INFINITY;
+    };
+    return indices.sort((a, b) => sorted.direction * (value(a) - value(b)));
+  }
+
+  private row(index: number): HTMLElement | null {
+    const model = this.models[index];
+    if (!model) return null;
+    const isShown = index === this.store.now.run;
     const name = button(
       { "aria-pressed": isShown, title: "Show this run" },
-      () => store.change({ run: index, against: "match", filter: "all" }),
+      () => this.store.change({ run: index, against: "match", filter: "all" }),
       lineOf(index, isShown),
       model.run.name,
     );
     const cells = kColumns.map((column) => {
       const value = column.value(model);
-      const isBest = value !== null && value === bestOf(column, models);
+      const isBest = value !== null && value === bestOf(column, this.models);
       return html(
         "td",
         { "data-key": `run.${index}.${column.key}`, class: isBest ? "best" : null },
@@ -144,32 +164,7 @@ export function comparison(store: Store, models: readonly RunModel[]) {
         isBest ? html("span", { class: "visually-hidden" }, " (best)") : null,
       );
     });
-    return html(
-      "tr",
-      { class: isShown ? "current" : null },
-      html("th", { scope: "row" }, name),
-      ...cells,
-    );
-  };
-
-  head.append(html("th", { scope: "col" }, "run"), ...heads.map(({ cell }) => cell));
-  const table = html(
-    "table",
-    { class: "numbers comparison" },
-    html(
-      "caption",
-      {},
-      "The runs side by side; the best of each column is bold. Choose a run to see it below.",
-    ),
-    html("thead", {}, head),
-    body,
-  );
-  return {
-    element: html(
-      "div",
-      { class: "scroll", tabindex: 0, role: "region", "aria-label": "Comparison of the runs" },
-      table,
-    ),
-    show,
-  };
+    const head = html("th", { scope: "row" }, name);
+    return html("tr", { class: isShown ? "current" : null }, head, ...cells);
+  }
 }

@@ -49,3 +49,11 @@ export function button(
 export function setPressed(target: Element, pressed: boolean): void {
   target.setAttribute("aria-pressed", String(pressed));
 }
+
+/** Renews what is in `container`; the button that had the focus gives it to its successor. */
+export function renew(container: HTMLElement, children: readonly Node[]): void {
+  const buttons = () => [...container.querySelectorAll("button")];
+  const at = buttons().indexOf(document.activeElement as HTMLButtonElement);
+  container.replaceChildren(...children);
+  if (at >= 0) buttons()[at]?.focus();
+}

@@ -5,11 +5,11 @@ import { button, html, setPressed } from "./dom.ts";
 import * as format from "./format.ts";
 import { type Filter, kFilters, type RunModel } from "./run_model.ts";
 import type { Selection, Store } from "./store.ts";
-import { isMarked, markIcon } from "./verdicts.ts";
+import { markIcon } from "./verdicts.ts";
 import type { View } from "./view.ts";
 
 const iconOf = (filter: Filter) =>
-  filter !== "all" && filter !== "loops" && isMarked(filter) ? markIcon(filter) : null;
+  filter === "all" || filter === "loops" ? null : markIcon(filter);
 
 /** Which frames the arrow keys walk. */
 export class Filters implements View {

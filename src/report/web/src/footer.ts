@@ -30,9 +30,18 @@ function changed(options: Options, defaults: Options): [string, string][] {
   return flat(options).filter(([name, value]) => usual.get(name) !== value);
 }
 
+/** The built-in world is an input without a path; its description says which one it was. */
+function inputOf({ input, counts }: RunRecord): string[] {
+  const world = input.description.match(/^built-in world, seed (\d+),.*?([\d.]+) laps/);
+  if (!world) return ["run", quoted(input.path)];
+  const [, seed = "", laps = ""] = world;
+  const frames = String(counts.frames * input.every);
+  return ["demo", "--seed", seed, "--frames", frames, "--world", `laps=${Number(laps)}`];
+}
+
 function commandOf(record: RunRecord, defaults: Options | undefined): string {
-  const { path, every, limit } = record.input;
-  const words = ["loopbit", "run", quoted(path), "--out", "again"];
+  const { every, limit } = record.input;
+  const words = ["loopbit", ...inputOf(record), "--out", "again"];
   if (every > 1) words.push("--every", String(every));
   if (limit > 0) words.push("--limit", String(limit));
   if (!defaults) return [...words, "--config", "options.json"].join(" ");

@@ -4,14 +4,14 @@
 import * as format from "./format.ts";
 import type { RunModel } from "./run_model.ts";
 import { nameOfStatus } from "./status_text.ts";
-import { isMarked, nameOf } from "./verdicts.ts";
+import { nameOf } from "./verdicts.ts";
 
 /** What the pointer is told about a frame. */
 export function frameText(model: RunModel, frame: number): string[] {
-  const verdict = model.verdict(frame);
+  const mark = model.mark(frame);
   const match = model.match(frame);
   const lines = [`frame ${frame}`];
-  if (isMarked(verdict)) lines[0] += `: ${nameOf(verdict)}`;
+  if (mark) lines[0] += `: ${nameOf(mark)}`;
   else lines[0] += `: ${nameOfStatus(model.status(frame))}`;
   if (match !== null) lines.push(`match ${match}, score ${format.score(model.score(frame))}`);
   return lines;

@@ -23,7 +23,7 @@ export function keyHelp(): { dialog: HTMLDialogElement; opener: HTMLButtonElemen
     "dialog",
     { id: "keys", "aria-labelledby": "keys-title" },
     html("h2", { id: "keys-title" }, "Keys"),
-    html("table", {}, html("tbody", {}, ...rows)),
+    html("table", { "aria-labelledby": "keys-title" }, html("tbody", {}, ...rows)),
     button({}, () => dialog.close(), "Close"),
   );
   const opener = button({ title: "Keys (?)" }, () => dialog.showModal(), "keys");

@@ -17,7 +17,8 @@ export function legend(): Legend {
   return {
     element,
     show(model) {
-      const entries = kMarked
+      const entries = [...kMarked]
+        .reverse()
         .filter((verdict) => model.framesMarked(verdict).length > 0)
         .map((verdict) =>
           html(

@@ -2,14 +2,19 @@
 // SPDX-License-Identifier: MIT
 
 import "./base.css";
-import "./views.css";
+import "./summary.css";
+import "./plots.css";
+import "./times.css";
 import "./pair.css";
+import "./pictures.css";
+import "./footer.css";
 import "./print.css";
 import { button, html } from "./dom.ts";
 import { Footer } from "./footer.ts";
 import { keyHelp, listenToKeys } from "./keyboard.ts";
 import { Matrix } from "./matrix.ts";
 import { PairBrowser } from "./pair_browser.ts";
+import { startPlots } from "./plot.ts";
 import { PrecisionRecall } from "./precision_recall.ts";
 import { followPrinting } from "./printing.ts";
 import type { ReportData } from "./report_data.ts";
@@ -89,6 +94,7 @@ function start(data: ReportData): void {
   showSelection();
   listenToKeys(store, dialog);
   followPrinting();
+  void startPlots().then(() => performance.mark("report-drawn"));
 }
 
 start(readData());

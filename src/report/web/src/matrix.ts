@@ -5,7 +5,8 @@ import { viridis } from "./colour_map.ts";
 import { html, svg } from "./dom.ts";
 import * as format from "./format.ts";
 import { frameText } from "./frame_text.ts";
-import { type Hit, Plot } from "./plot.ts";
+import { Plot } from "./plot.ts";
+import type { Hit } from "./plot_spec.ts";
 import { nearest, type Projection } from "./projection.ts";
 import type { RunModel } from "./run_model.ts";
 import { decodeMatrix, type SimilarityImage } from "./similarity_image.ts";
@@ -34,6 +35,7 @@ export class Matrix implements View {
       yLabel: "query",
       height: (width) => width - 8,
       zoom: "xy",
+      whole: "xy",
       yDown: true,
       bounds: () => {
         const frames = Math.max(1, this.store.model.frames);
@@ -120,8 +122,7 @@ export class Matrix implements View {
     const model = this.store.model;
     const radius = Math.max(2.5, markRadius(model.framesIn("loops").length) - 1) * to.ratio;
     for (const verdict of kMarked) {
-      if (verdict === "missed") continue;
-      const points = model.framesMarked(verdict).map((frame) => ({
+      const points = model.loopsMarked(verdict).map((frame) => ({
         x: to.x((model.match(frame) ?? 0) + 0.5),
         y: to.y(frame + 0.5),
       }));

@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
-import { button, html, setPressed } from "./dom.ts";
+import { button, html, renew, setPressed } from "./dom.ts";
 import { Filters } from "./filters.ts";
 import * as format from "./format.ts";
 import { PairContents } from "./pair_contents.ts";
@@ -105,8 +105,8 @@ export class PairBrowser implements View {
       if (truth !== null) add(`true place ${truth}`, "truth");
       if (typeof against === "number") add(`frame ${against}`, against);
     }
-    this.partners.replaceChildren(...choices);
-    this.partners.hidden = choices.length === 0;
+    renew(this.partners, choices);
+    this.partners.hidden = choices.length < 2;
   }
 
   private toggleLines(): void {

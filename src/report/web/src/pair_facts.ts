@@ -4,8 +4,8 @@
 import { type Child, html } from "./dom.ts";
 import * as format from "./format.ts";
 import type { RunModel } from "./run_model.ts";
-import { meaningOfStatus, nameOfStatus } from "./status_text.ts";
-import { isMarked, markIcon, nameOf } from "./verdicts.ts";
+import { meaningOfLoop, meaningOfStatus, nameOfStatus } from "./status_text.ts";
+import { markIcon, nameOf } from "./verdicts.ts";
 
 function fact(name: string, key: string, ...value: Child[]): HTMLElement {
   return html("div", {}, html("dt", {}, name), html("dd", { "data-key": `pair.${key}` }, ...value));
@@ -15,20 +15,20 @@ function fact(name: string, key: string, ...value: Child[]): HTMLElement {
 export function pairFacts(model: RunModel, frame: number): HTMLElement[] {
   const { run } = model;
   const status = model.status(frame);
-  const verdict = model.verdict(frame);
+  const mark = model.mark(frame);
   const time = run.timestamp_s?.[frame];
   const line = html(
     "p",
-    { class: `verdict ${verdict}`, "data-key": "pair.verdict" },
-    isMarked(verdict) ? markIcon(verdict) : null,
-    html("strong", {}, isMarked(verdict) ? nameOf(verdict) : nameOfStatus(status)),
-    verdict === "ignored" ? " Left out of the score." : null,
+    { class: `verdict ${mark ?? "none"}`, "data-key": "pair.verdict" },
+    mark ? markIcon(mark) : null,
+    html("strong", {}, mark ? nameOf(mark) : nameOfStatus(status)),
+    !mark && model.verdict(frame) === "ignored" ? "(not scored)" : null,
   );
   const why = html(
     "p",
     { class: "why" },
-    isMarked(verdict) && status !== "loop" ? `${nameOfStatus(status)}: ` : null,
-    meaningOfStatus(status),
+    mark && status !== "loop" ? `${nameOfStatus(status)}: ` : null,
+    model.isLoop(frame) ? meaningOfLoop(model.verdict(frame)) : meaningOfStatus(status),
   );
   const threshold = run.threshold;
   const limit =

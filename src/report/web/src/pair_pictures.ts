@@ -4,13 +4,15 @@
 import { bytesOf } from "./content.ts";
 import { html, svg } from "./dom.ts";
 import type { RunModel } from "./run_model.ts";
-import { isMarked } from "./verdicts.ts";
 
 /** Between the two pictures, as a share of the width of one. */
 const kGap = 0.02;
 /** Wider pictures stand one above the other. */
 const kWide = 1.9;
-const kManyLines = 60;
+const kManyLines = 40;
+const kCrowd = 120;
+/** Radius of an inlier, as a share of the width of a picture. */
+const kDot = 0.009;
 
 /** Query and match side by side, and the inlier matches as lines from one to the other. */
 export class PairPictures {
@@ -35,8 +37,7 @@ export class PairPictures {
       framed(match, aspect, model, partner, partner === null ? "no candidate" : `match ${partner}`),
     );
     if (query && match && inliers.length > 0) {
-      const verdict = model.verdict(frame);
-      const mark = isMarked(verdict) ? verdict : "none";
+      const mark = model.mark(frame) ?? "none";
       this.element.append(linesOf(inliers, aspect, isStacked, mark));
     }
   }
@@ -103,9 +104,11 @@ function linesOf(
 ): SVGSVGElement {
   const size = isStacked ? [1, 2 * aspect + kGap] : [2 + kGap, aspect];
   const [dx, dy] = isStacked ? [0, aspect + kGap] : [1 + kGap, 0];
-  const many = inliers.length / 4 > kManyLines;
+  const count = inliers.length / 4;
+  const density = `${count > kManyLines ? " many" : ""}${count > kCrowd ? " crowd" : ""}`;
+  const r = count > kCrowd ? 0.7 * kDot : kDot;
   const drawing = svg("svg", {
-    class: `inliers ${mark}${many ? " many" : ""}`,
+    class: `inliers ${mark}${density}`,
     viewBox: `0 0 ${size.join(" ")}`,
     preserveAspectRatio: "none",
     "aria-hidden": "true",
@@ -118,8 +121,9 @@ function linesOf(
       number,
     ];
     const ends = { x1, y1: y1 * aspect, x2: x2 + dx, y2: y2 * aspect + dy };
-    drawing.append(svg("line", { ...ends, class: "under" }));
     drawing.append(svg("line", ends));
+    drawing.append(svg("circle", { cx: ends.x1, cy: ends.y1, r }));
+    drawing.append(svg("circle", { cx: ends.x2, cy: ends.y2, r }));
   }
   return drawing;
 }

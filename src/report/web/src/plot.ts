@@ -3,46 +3,14 @@
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { type Bounds, middle, panned, withEqualAxes, type ZoomAxes, zoomed } from "./bounds.ts";
+import { type Bounds, middle, panned, withEqualAxes, zoomed } from "./bounds.ts";
 import { button, html, svg } from "./dom.ts";
+import { axesOf } from "./plot_axes.ts";
+import { kZoomStep, listenToPlot, type PlotInput } from "./plot_input.ts";
+import type { Hit, PlotSpec } from "./plot_spec.ts";
 import { Projection } from "./projection.ts";
-import type { Against } from "./store.ts";
-import { onThemeChange, type Theme, theme } from "./theme.ts";
-import { hideTip, showTip } from "./tip.ts";
+import { onThemeChange, theme } from "./theme.ts";
 
-/** What is under the pointer. */
-export interface Hit {
-  frame: number;
-  against?: Against;
-  /** Where it is drawn; hairlines instead of a ring where `cross` is set. */
-  at: { x: number; y: number };
-  cross?: boolean;
-  text: readonly string[];
-}
-
-export interface PlotSpec {
-  /** For those who do not see it. */
-  label: string;
-  xLabel: string;
-  yLabel: string;
-  height: (width: number) => number;
-  zoom: ZoomAxes;
-  equalAxes?: boolean;
-  yDown?: boolean;
-  hideAxes?: boolean;
-  /** All there is to see. */
-  bounds(): Bounds;
-  draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void;
-  /** `pixel` and `to` in CSS pixels of the plotting area. */
-  hit(pixel: { x: number; y: number }, to: Projection): Hit | null;
-  /** Marks what is selected, in CSS pixels of the plotting area. */
-  selected(to: Projection): SVGElement[];
-  select(hit: Hit): void;
-}
-
-const kAxisFont_px = 12;
-const kDragBegins_px = 4;
-const kZoomStep = 1.6;
 const plots: Plot[] = [];
 
 /** Before and after printing the page has another width, and no observer tells in time. */
@@ -50,8 +18,16 @@ export function resizePlots(): void {
   for (const plot of plots) plot.resize();
 }
 
+/** Draws the plots one by one, each after what was ready before it is on the screen. */
+export async function startPlots(): Promise<void> {
+  for (const plot of plots) {
+    await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+    plot.start();
+  }
+}
+
 /** uPlot for axes, scales and canvas; what is on it is drawn by the view. */
-export class Plot {
+export class Plot implements PlotInput {
   readonly element: HTMLElement;
   private readonly overlay = svg("svg", { class: "overlay", "aria-hidden": "true" });
   private plot: uPlot | null = null;
@@ -67,10 +43,14 @@ export class Plot {
       tabindex: spec.zoom === "none" ? null : 0,
       "aria-label": spec.label + keys,
     });
-    this.element.addEventListener("keydown", (event) => this.onKey(event));
-    new ResizeObserver(() => this.resize()).observe(this.element);
     onThemeChange(() => this.plot?.redraw(false, true));
     plots.push(this);
+  }
+
+  /** From now on it is drawn, as wide as there is room. */
+  start(): void {
+    this.resize();
+    new ResizeObserver(() => this.resize()).observe(this.element);
   }
 
   /** Buttons for those who neither wheel nor drag. */
@@ -104,6 +84,23 @@ export class Plot {
     this.show(this.home);
   }
 
+  get isZoomable(): boolean {
+    return this.spec.zoom !== "none";
+  }
+
+  get bounds(): Bounds {
+    return this.view;
+  }
+
+  hover(hit: Hit | null): void {
+    this.hovered = hit;
+    this.mark();
+  }
+
+  select(hit: Hit): void {
+    this.spec.select(hit);
+  }
+
   redraw(): void {
     this.plot?.redraw(false, false);
   }
@@ -129,34 +126,18 @@ export class Plot {
   }
 
   private make(size: { width: number; height: number }): uPlot {
-    const colour = (name: "muted" | "rule") => () => theme()[name];
-    const axis = (label: string): uPlot.Axis => ({
-      label,
-      show: this.spec.hideAxes !== true,
-      stroke: colour("muted"),
-      font: `${kAxisFont_px}px ${theme().font}`,
-      labelFont: `${kAxisFont_px}px ${theme().font}`,
-      labelSize: 20,
-      labelGap: 0,
-      gap: 4,
-      grid: { stroke: colour("rule"), width: 1 },
-      ticks: { stroke: colour("rule"), width: 1, size: 4 },
-    });
     const range = (axis: "x" | "y") => (): uPlot.Range.MinMax => [...this.view[axis]];
     const plot = new uPlot(
       {
         ...size,
-        padding: [10, 10, 2, 2],
+        padding: [10, 14, 2, 2],
         legend: { show: false },
         cursor: { show: false },
         scales: {
           x: { time: false, range: range("x") },
           y: { range: range("y"), dir: this.spec.yDown ? -1 : 1 },
         },
-        axes: [
-          { ...axis(this.spec.xLabel), size: 28, space: 60 },
-          { ...axis(this.spec.yLabel), size: 46, space: 36 },
-        ],
+        axes: axesOf(this.spec),
         series: [{}, { paths: () => null, points: { show: false } }],
         hooks: { draw: [(drawn) => this.draw(drawn)] },
       },
@@ -167,63 +148,24 @@ export class Plot {
       this.element,
     );
     plot.over.append(this.overlay);
-    this.listen(plot.over);
+    listenToPlot(this, plot.over);
     return plot;
   }
 
-  private listen(over: HTMLElement): void {
-    over.addEventListener("pointermove", (event) => this.hover(event));
-    over.addEventListener("pointerleave", () => this.unhover());
-    over.addEventListener("pointerdown", (event) => this.drag(over, event));
-    // The wheel scrolls the page unless the plot was clicked or Ctrl is held.
-    over.addEventListener("wheel", (event) => {
-      const isMeant = event.ctrlKey || document.activeElement === this.element;
-      if (this.spec.zoom === "none" || !isMeant) return;
-      event.preventDefault();
-      this.zoom(Math.exp(-event.deltaY / 400), this.pixel(event));
-    });
-  }
-
-  private onKey(event: KeyboardEvent): void {
-    if (event.ctrlKey || event.metaKey || event.altKey || this.spec.zoom === "none") return;
-    if (event.key === "+" || event.key === "=") this.zoom(kZoomStep);
-    else if (event.key === "-") this.zoom(1 / kZoomStep);
-    else if (event.key === "0") this.reset();
-  }
-
-  private drag(over: HTMLElement, down: PointerEvent): void {
-    if (down.button !== 0) return;
-    const start = this.view;
-    let isDrag = false;
-    const move = (event: PointerEvent) => {
-      const dx = event.clientX - down.clientX;
-      const dy = event.clientY - down.clientY;
-      isDrag ||= Math.hypot(dx, dy) >= kDragBegins_px;
-      if (!isDrag || !this.plot) return;
-      const { width, height } = this.area(this.plot);
-      const xUnits = ((start.x[1] - start.x[0]) / width) * -dx;
-      const yUnits = ((start.y[1] - start.y[0]) / height) * (this.spec.yDown ? -dy : dy);
-      this.show(panned(start, this.home, this.spec.zoom, xUnits, yUnits));
-    };
-    const end = (event: PointerEvent) => {
-      over.removeEventListener("pointermove", move);
-      over.removeEventListener("pointerup", end);
-      over.removeEventListener("pointercancel", end);
-      if (isDrag || event.type === "pointercancel") return;
-      const hit = this.hitAt(event);
-      if (hit) this.spec.select(hit);
-    };
-    over.setPointerCapture(down.pointerId);
-    over.addEventListener("pointermove", move);
-    over.addEventListener("pointerup", end);
-    over.addEventListener("pointercancel", end);
-  }
-
-  private zoom(factor: number, pixel?: { x: number; y: number }): void {
+  zoom(factor: number, event?: MouseEvent): void {
     if (!this.plot) return;
+    const pixel = event && this.pixel(event);
     const to = this.projection(this.plot);
     const about = pixel ? { x: to.atX(pixel.x), y: to.atY(pixel.y) } : middle(this.view);
     this.show(zoomed(this.view, this.home, this.spec.zoom, factor, about));
+  }
+
+  pan(from: Bounds, dx: number, dy: number): void {
+    if (!this.plot) return;
+    const { width, height } = this.area(this.plot);
+    const xUnits = ((from.x[1] - from.x[0]) / width) * -dx;
+    const yUnits = ((from.y[1] - from.y[0]) / height) * (this.spec.yDown ? -dy : dy);
+    this.show(panned(from, this.home, this.spec.zoom, xUnits, yUnits));
   }
 
   private show(view: Bounds): void {
@@ -266,21 +208,8 @@ export class Plot {
     return { x: event.clientX - (box?.left ?? 0), y: event.clientY - (box?.top ?? 0) };
   }
 
-  private hitAt(event: MouseEvent): Hit | null {
+  hitAt(event: MouseEvent): Hit | null {
     return this.plot ? this.spec.hit(this.pixel(event), this.projection(this.plot)) : null;
-  }
-
-  private hover(event: PointerEvent): void {
-    this.hovered = event.buttons === 0 ? this.hitAt(event) : null;
-    if (this.hovered) showTip(this.hovered.text, event.clientX, event.clientY);
-    else hideTip();
-    this.mark();
-  }
-
-  private unhover(): void {
-    this.hovered = null;
-    hideTip();
-    this.mark();
   }
 
   private hoverMarks(to: Projection): SVGElement[] {

@@ -3,7 +3,8 @@
 
 import { html, svg } from "./dom.ts";
 import * as format from "./format.ts";
-import { type Hit, Plot } from "./plot.ts";
+import { Plot } from "./plot.ts";
+import type { Hit } from "./plot_spec.ts";
 import { nearest, type Projection } from "./projection.ts";
 import type { CurvePoint } from "./report_data.ts";
 import { dashOf, lineOf } from "./run_lines.ts";

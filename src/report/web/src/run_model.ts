@@ -85,10 +85,15 @@ export class RunModel {
   framesMarked(verdict: Marked): readonly number[] {
     let frames = this.marked.get(verdict);
     if (!frames) {
-      frames = this.where((frame) => this.verdict(frame) === verdict);
+      frames = this.where((frame) => this.mark(frame) === verdict);
       this.marked.set(verdict, frames);
     }
     return frames;
+  }
+
+  /** Those of them that are loops: a missed frame may be one, too, but not with a true place. */
+  loopsMarked(verdict: Marked): readonly number[] {
+    return this.framesMarked(verdict).filter((frame) => this.isLoop(frame));
   }
 
   /** The frames that pass a filter, in order. */
@@ -129,8 +134,10 @@ export class RunModel {
     return best >= 0 ? best : (this.framesIn("missed")[0] ?? 0);
   }
 
-  hasMark(frame: number): boolean {
-    return isMarked(this.verdict(frame));
+  /** What the frame is marked as; an ignored frame only if it is a loop. */
+  mark(frame: number): Marked | null {
+    const verdict = this.verdict(frame);
+    return isMarked(verdict) && (verdict !== "ignored" || this.isLoop(frame)) ? verdict : null;
   }
 
   private where(passes: (frame: number) => boolean): number[] {

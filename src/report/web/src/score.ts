@@ -26,6 +26,7 @@ export class Score implements View {
       yLabel: "score",
       height: (width) => Math.max(220, Math.min(width * 0.34, 300)),
       zoom: "x",
+      whole: "x",
       bounds: () => this.bounds(),
       draw: (ctx, to, theme) => this.draw(ctx, to, theme),
       hit: (pixel, to) => {
@@ -67,7 +68,7 @@ export class Score implements View {
   private bounds(): Bounds {
     const { run, frames } = this.store.model;
     const scores = run.score.filter(Number.isFinite);
-    const top = scores.reduce((a, b) => Math.max(a, b), run.threshold ?? 0);
+    const top = scores.reduce((a, b) => Math.max(a, b), 1.15 * (run.threshold ?? 0));
     const low = scores.reduce((a, b) => Math.min(a, b), 0);
     const air = (top - low || 1) * 0.07;
     const side = Math.max(0.5, frames * 0.012);
@@ -92,7 +93,7 @@ export class Score implements View {
     const size = (model.frames > 2000 ? 2 : 3) * to.ratio;
     ctx.fillStyle = theme.faint;
     for (let frame = 0; frame < model.frames; ++frame) {
-      if (model.hasMark(frame)) continue;
+      if (model.mark(frame) !== null) continue;
       ctx.fillRect(to.x(frame) - size / 2, to.y(model.score(frame)) - size / 2, size, size);
     }
   }
@@ -131,7 +132,7 @@ export class Score implements View {
       pixel,
       model.frames,
       (frame) => this.place(frame),
-      (frame) => (model.hasMark(frame) ? -4 : 0),
+      (frame) => (model.mark(frame) !== null ? -4 : 0),
     );
     if (near !== null) return near;
     const frame = Math.round(to.atX(pixel.x));

@@ -35,8 +35,9 @@ export async function decodeMatrix(matrix: SimilarityMatrix): Promise<Similarity
   for (let i = 0; i < levels.length; ++i) {
     const row = Math.floor(i / side);
     const [red, green, blue] = palette[levels[i] ?? 0] ?? [0, 0, 0];
-    // Later frames than the query are no candidates: nothing is drawn there.
-    pixels.data.set([red, green, blue, i % side > row ? 0 : 255], 4 * i);
+    // Neither the query nor later frames are candidates: nothing is drawn there.
+    const isCandidate = i % side < row || (i % side === row && matrix.frames_per_cell > 1);
+    pixels.data.set([red, green, blue, isCandidate ? 255 : 0], 4 * i);
   }
   ctx.putImageData(pixels, 0, 0);
   const range = [low / 255, high / 255] as const;

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
+import type { Verdict } from "./report_data.ts";
+
 /** Why a frame has no loop, and what helps: the table of docs/run_folder.md in sentences. */
 const kMeanings: Record<string, string> = {
   loop: "The match is accepted.",
@@ -17,5 +19,16 @@ const kMeanings: Record<string, string> = {
   unreadable: "The image is damaged, of another size, or no image.",
 };
 
+const kJudged: Partial<Record<Verdict, string>> = {
+  right: "The match is accepted, and it is a true place.",
+  wrong: "The match is accepted, but it is no true place of this frame.",
+  tolerated: "The match is accepted; truth counts it neither as right nor as wrong.",
+  missed: "The match is accepted and not wrong, but it is no true place of this frame.",
+  ignored: "The match is accepted; truth leaves this frame out of the score.",
+};
+
+/** What became of a loop, as far as truth can tell. */
+export const meaningOfLoop = (verdict: Verdict): string =>
+  kJudged[verdict] ?? kMeanings["loop"] ?? "";
 export const meaningOfStatus = (status: string): string => kMeanings[status] ?? "";
 export const nameOfStatus = (status: string): string => status.replaceAll("_", " ");

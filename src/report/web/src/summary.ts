@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
-import { comparison } from "./comparison.ts";
+import { Comparison } from "./comparison.ts";
 import { html } from "./dom.ts";
 import * as format from "./format.ts";
 import { keyNumbers } from "./key_numbers.ts";
@@ -16,7 +16,8 @@ export function sentenceOf(model: RunModel): string {
   const loops = model.framesIn("loops").length;
   const frames = format.counted(model.frames, "frame");
   if (!evaluation) {
-    return `${capital(format.counted(loops, "loop"))} found in ${frames}; no truth says whether they are right.`;
+    const unknown = loops > 0 ? "judge them by" : "say whether one was missed";
+    return `${capital(format.counted(loops, "loop"))} found in ${frames}; there is no truth to ${unknown}.`;
   }
   const { right, positives, wrong, tolerated } = evaluation;
   const found =
@@ -38,13 +39,13 @@ export class Summary implements View {
   private readonly notice = html("p", { class: "notice", role: "note" });
   private readonly numbers = html("div", { class: "key-numbers" });
   private readonly origin = html("p", { class: "origin" });
-  private readonly table: ReturnType<typeof comparison> | null;
+  private readonly table: Comparison | null;
 
   constructor(
     store: Store,
     private readonly models: readonly RunModel[],
   ) {
-    this.table = models.length > 1 ? comparison(store, models) : null;
+    this.table = models.length > 1 ? new Comparison(store, models) : null;
     this.element = html(
       "header",
       { id: "summary" },
@@ -62,7 +63,8 @@ export class Summary implements View {
     const { run } = model;
     this.title.textContent = run.name;
     document.title = `${run.name} - loopbit report`;
-    this.input.textContent = run.record?.input.description ?? "";
+    const { path, description } = run.record?.input ?? { path: "", description: "" };
+    this.input.textContent = path && `${path} (${description})`;
     this.sentence.textContent = sentenceOf(model);
     const notice = noticeOf(run);
     this.notice.textContent = notice;

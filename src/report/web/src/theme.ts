@@ -13,6 +13,7 @@ const kNames = [
   "missed",
   "tolerated",
   "loop",
+  "ignored",
   "path",
   "step-content",
   "step-retrieval",

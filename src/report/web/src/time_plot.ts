@@ -4,7 +4,8 @@
 import type { Bounds } from "./bounds.ts";
 import { svg } from "./dom.ts";
 import * as format from "./format.ts";
-import { type Hit, Plot } from "./plot.ts";
+import { Plot } from "./plot.ts";
+import type { Hit } from "./plot_spec.ts";
 import type { Projection } from "./projection.ts";
 import { kSteps } from "./run_model.ts";
 import type { Store } from "./store.ts";
@@ -35,6 +36,7 @@ export class TimePlot {
       yLabel: isDistribution ? "frames" : "ms a frame",
       height: () => 230,
       zoom: "none",
+      whole: isDistribution ? "y" : "x",
       bounds: () => this.bounds(),
       draw: (ctx, to, theme) => this.draw(ctx, to, theme),
       hit: (pixel, to) => this.hitAt(pixel, to),
@@ -69,7 +71,10 @@ export class TimePlot {
         : binsByFrame(model, kStretches);
     }
     const top = this.bins.reduce((most, bin) => Math.max(most, this.heightOf(bin)), 0);
-    return { x: [0, this.bins.at(-1)?.to ?? 1], y: [0, (top || 1) * 1.12] };
+    return {
+      x: [0, this.bins.at(-1)?.to ?? 1],
+      y: [0, (top || 1) * (this.isDistribution ? 1.3 : 1.08)],
+    };
   }
 
   private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {

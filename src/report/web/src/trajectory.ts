@@ -11,7 +11,7 @@ import { nearest, type Projection } from "./projection.ts";
 import type { RunModel } from "./run_model.ts";
 import type { Selection, Store } from "./store.ts";
 import type { Theme } from "./theme.ts";
-import { drawMarks, isMarked, kMarked, markRadius, type Point } from "./verdicts.ts";
+import { drawMarks, kMarked, markRadius, type Point } from "./verdicts.ts";
 import { caption, section, type View } from "./view.ts";
 
 /** A marked frame is meant even where the path comes a little nearer. */
@@ -36,6 +36,7 @@ export class Trajectory implements View {
       height: (width) => Math.max(280, Math.min(width * 0.62, 560)),
       zoom: "xy",
       equalAxes: true,
+      hideAxes: () => this.isRing,
       bounds: () => this.bounds(),
       draw: (ctx, to, theme) => this.draw(ctx, to, theme),
       hit: (pixel, to) => {
@@ -102,7 +103,7 @@ export class Trajectory implements View {
     const count = model.framesIn("loops").length + model.framesIn("missed").length;
     const radius = markRadius(count) * to.ratio;
     for (const verdict of kMarked) {
-      if (verdict !== "missed") this.drawLoops(ctx, to, theme, verdict, count);
+      this.drawLoops(ctx, to, theme, verdict, count);
     }
     for (const verdict of kMarked) {
       const points: Point[] = [];
@@ -138,7 +139,7 @@ export class Trajectory implements View {
   ): void {
     const model = this.store.model;
     const path = new Path2D();
-    for (const frame of model.framesMarked(verdict)) {
+    for (const frame of model.loopsMarked(verdict)) {
       const from = this.places[frame];
       const match = this.places[model.match(frame) ?? -1];
       if (from && match) this.addLink(path, to, from, match, count);
@@ -154,9 +155,10 @@ export class Trajectory implements View {
   private addLink(path: Path2D, to: Projection, from: Point, match: Point, count: number): void {
     path.moveTo(to.x(from.x), to.y(from.y));
     const steps = this.isRing && count < kManyLoops ? kCurveSteps : 1;
+    const bend = Math.min(1, Math.hypot(match.x - from.x, match.y - from.y));
     for (let step = 1; step <= steps; ++step) {
       const t = step / steps;
-      const pull = steps === 1 ? 1 : 1 - 1.2 * t * (1 - t);
+      const pull = steps === 1 ? 1 : 1 - bend * t * (1 - t);
       const x = (from.x + (match.x - from.x) * t) * pull;
       const y = (from.y + (match.y - from.y) * t) * pull;
       path.lineTo(to.x(x), to.y(y));
@@ -191,7 +193,7 @@ export class Trajectory implements View {
       pixel,
       this.places.length,
       (frame) => this.places[frame] ?? null,
-      (frame) => (isMarked(model.verdict(frame)) ? kMarkedFirst_px : 0),
+      (frame) => (model.mark(frame) ? kMarkedFirst_px : 0),
     );
   }
 

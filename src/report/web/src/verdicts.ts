@@ -14,11 +14,17 @@ interface Mark {
   style: "filled" | "stroked" | "hollow";
 }
 
-export type Marked = "right" | "wrong" | "missed" | "tolerated" | "loop";
+export type Marked = Exclude<Verdict, "none">;
 
 const kCircle = "M0.8,0A0.8,0.8 0 1 1 -0.8,0A0.8,0.8 0 1 1 0.8,0Z";
 
 const kMarks: Record<Marked, Mark> = {
+  ignored: {
+    name: "not scored",
+    meaning: "a loop that truth says to leave out of the score",
+    path: kCircle,
+    style: "hollow",
+  },
   right: { name: "right", meaning: "a loop, and true", path: kCircle, style: "filled" },
   tolerated: {
     name: "tolerated",
@@ -47,7 +53,14 @@ const kMarks: Record<Marked, Mark> = {
 };
 
 /** In the order of drawing: what matters most comes last, on top. */
-export const kMarked: readonly Marked[] = ["right", "tolerated", "loop", "missed", "wrong"];
+export const kMarked: readonly Marked[] = [
+  "ignored",
+  "tolerated",
+  "loop",
+  "right",
+  "missed",
+  "wrong",
+];
 
 export const isMarked = (verdict: Verdict): verdict is Marked => verdict in kMarks;
 export const nameOf = (verdict: Marked): string => kMarks[verdict].name;

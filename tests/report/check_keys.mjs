@@ -1,0 +1,155 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+// The page works without a pointer, and says what it is to those who do not see it.
+import assert from "node:assert/strict";
+import { address, drawn, embedded, goTo, settled, shownFrame } from "./browser.mjs";
+
+const framesWith = (run, filter) =>
+  run.verdict.flatMap((verdict, i) => {
+    if (filter === "all") return [i];
+    const isIn =
+      filter === "loops" ? run.status_names[run.status[i]] === "loop" : verdict === filter;
+    return isIn ? [i] : [];
+  });
+
+/** Arrow keys, Home and End walk exactly the frames that the filter lets through. */
+export async function checkFilters(page) {
+  const run = (await embedded(page)).runs[0];
+  for (const filter of ["all", "loops", "right", "wrong", "missed", "tolerated"]) {
+    const frames = framesWith(run, filter);
+    const button = page.locator(`[data-filter=${filter}]`);
+    if (frames.length === 0) {
+      assert.ok((await button.isDisabled()) || !(await button.isVisible()), `${filter} of nothing`);
+      continue;
+    }
+    await button.press("Enter");
+    assert.equal(await button.getAttribute("aria-pressed"), "true", filter);
+    assert.ok(frames.includes(await shownFrame(page)), `${filter}: a frame that it leaves out`);
+    await page.keyboard.press("Home");
+    const walked = [await shownFrame(page)];
+    for (let i = 1; i < Math.min(5, frames.length); ++i) {
+      await page.keyboard.press("ArrowRight");
+      walked.push(await shownFrame(page));
+    }
+    assert.deepEqual(walked, frames.slice(0, walked.length), `${filter}: walked`);
+    await page.keyboard.press("End");
+    assert.equal(await shownFrame(page), frames.at(-1), `${filter}: the last`);
+    await page.keyboard.press("ArrowLeft");
+    assert.equal(
+      await shownFrame(page),
+      frames.at(-2) ?? frames.at(-1),
+      `${filter}: the last but one`,
+    );
+    const gap = frames.findIndex((frame, i) => frames[i + 1] > frame + 1);
+    if (gap < 0) continue;
+    await goTo(page, frames[gap] + 1);
+    await page.keyboard.press("ArrowRight");
+    assert.equal(await shownFrame(page), frames[gap + 1], `${filter}: from a frame it leaves out`);
+    await page.keyboard.press("ArrowLeft");
+    assert.equal(await shownFrame(page), frames[gap], `${filter}: back over a gap`);
+  }
+  await page.locator("[data-filter=all]").press("Enter");
+}
+
+/** A missed frame beside its best candidate or its true place. */
+export async function checkTruePlace(page) {
+  const run = (await embedded(page)).runs[0];
+  const missed = run.verdict.indexOf("missed");
+  if (missed < 0) return;
+  await goTo(page, missed);
+  await page.locator(".partners button", { hasText: "true place" }).press("Enter");
+  await settled(page);
+  const shown = Number(
+    (await page.textContent("#pair .picture:nth-child(2) .tag")).match(/\d+/)[0],
+  );
+  const triples = run.truth.same_place;
+  const isTrue = triples.some(
+    (query, i) =>
+      i % 3 === 0 && query === missed && shown >= triples[i + 1] && shown <= triples[i + 2],
+  );
+  assert.ok(isTrue, `${shown} is no true place of ${missed}`);
+  assert.equal((await address(page)).with, "truth");
+  const focused = await page.evaluate(() => document.activeElement.textContent);
+  assert.match(focused, /true place/, "the choice loses the focus");
+}
+
+export async function checkAddress(page) {
+  const run = (await embedded(page)).runs[0];
+  const frame = Math.floor(run.frames / 2);
+  await goTo(page, frame);
+  if (run.frames > 1) assert.equal((await address(page)).frame, String(frame));
+  await page.reload();
+  await drawn(page);
+  assert.equal(await shownFrame(page), frame, "after a reload");
+  await page.evaluate(() => {
+    location.hash = "#frame=0";
+  });
+  await page.waitForFunction(() => document.getElementById("frame-number").value === "0");
+}
+
+export async function checkHelp(page) {
+  await page.keyboard.press("?");
+  assert.ok(await page.isVisible("#keys"), "? shows no keys");
+  await page.keyboard.press("Escape");
+  assert.ok(!(await page.isVisible("#keys")), "Esc leaves the keys open");
+  const before = await shownFrame(page);
+  await page.focus("#frame-number");
+  await page.keyboard.press("ArrowRight");
+  assert.equal(await shownFrame(page), before, "arrow keys walk while a number is typed");
+  await page.fill("#frame-number", "nonsense");
+  await page.keyboard.press("Enter");
+  assert.equal(await shownFrame(page), before, "nonsense selects a frame");
+  await page.evaluate(() => document.activeElement.blur());
+}
+
+/** By Tab alone one comes to every control, and sees where one is. */
+export async function checkTabs(page) {
+  await page.evaluate(() => document.activeElement.blur());
+  const reached = new Set();
+  for (let i = 0; i < 120; ++i) {
+    await page.keyboard.press("Tab");
+    const state = await page.evaluate(() => {
+      const focused = document.activeElement;
+      if (!focused || focused === document.body) return null;
+      focused.dataset.reached = "";
+      return {
+        name: focused.outerHTML.slice(0, 80),
+        outline: getComputedStyle(focused).outlineStyle,
+      };
+    });
+    if (!state) break;
+    assert.notEqual(state.outline, "none", `the focus cannot be seen: ${state.name}`);
+    reached.add(state.name);
+  }
+  const missed = await page.$$eval("button, input, summary, [tabindex='0']", (all) =>
+    all
+      .filter((one) => one.checkVisibility() && !one.disabled && !("reached" in one.dataset))
+      .map((one) => one.outerHTML.slice(0, 90)),
+  );
+  assert.deepEqual(missed, [], "Tab never comes to these");
+  return reached.size;
+}
+
+/** Names for controls, captions for tables, alternatives for pictures. */
+export async function checkNames(page) {
+  const nameless = await page.evaluate(() => {
+    const problems = [];
+    for (const one of document.querySelectorAll(
+      "button, input, summary, section, [role=group], [role=img]",
+    )) {
+      const labelled = one.getAttribute("aria-labelledby");
+      const name =
+        one.getAttribute("aria-label") ??
+        (labelled ? document.getElementById(labelled)?.textContent : one.textContent);
+      if (!name?.trim()) problems.push(one.outerHTML.slice(0, 90));
+    }
+    for (const table of document.querySelectorAll("table")) {
+      if (!table.caption && !table.hasAttribute("aria-labelledby"))
+        problems.push("a table without caption");
+    }
+    for (const image of document.images)
+      if (!image.hasAttribute("alt")) problems.push("a picture without alt");
+    return problems;
+  });
+  assert.deepEqual(nameless, [], "without a name");
+}

@@ -1,0 +1,195 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+// The report page in a real browser:
+//
+//   node report_test.mjs [--report FILE [--run-json FILE]]... [--page FILE] [--playwright DIR]
+//                        [--screenshots DIR]
+//
+// --report: a page as the command writes it, and the run.json it must agree with.
+// --page: the page before data is put into it; it is tested with made-up data of many kinds.
+// --playwright: the node_modules that holds playwright-core. CHROMIUM names the browser.
+import assert from "node:assert/strict";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import path from "node:path";
+import { embedded, launch, open, settled } from "./browser.mjs";
+import {
+  checkAddress,
+  checkFilters,
+  checkHelp,
+  checkNames,
+  checkTabs,
+  checkTruePlace,
+} from "./check_keys.mjs";
+import { checkPaper, checkThemes, checkWidths } from "./check_looks.mjs";
+import { checkNumbers, checkPairs } from "./check_numbers.mjs";
+import { checkDrawn, checkViews } from "./check_views.mjs";
+import { pageWith, sampleData } from "./sample.mjs";
+
+const kSamples = {
+  "several revisits": {},
+  "no truth": { truth: false },
+  "no poses": { poses: false },
+  "no pictures": { pictures: false },
+  "no loops": { noLoops: true },
+  "no room for pictures": { picturesMb: 0.2 },
+  "unreadable frames": { frames: 150, unreadable: true },
+  "another detector": { external: true },
+  "three runs": { runs: 3, external: true },
+  "one frame": { frames: 1 },
+  "two frames": { frames: 2, truth: false, poses: false },
+};
+/** The samples that also stand for looks and keys; the others differ in data only. */
+const kInFull = ["several revisits", "three runs", "one frame"];
+
+function argumentsOf(words) {
+  const found = { reports: [], page: null, playwright: "node_modules", screenshots: null };
+  for (let i = 0; i < words.length; i += 2) {
+    const [name, value] = [words[i], words[i + 1]];
+    assert.ok(value, `${name} needs a value`);
+    if (name === "--report") found.reports.push({ file: value, runJson: null });
+    else if (name === "--run-json") found.reports.at(-1).runJson = value;
+    else if (["--page", "--playwright", "--screenshots"].includes(name))
+      found[name.slice(2)] = value;
+    else assert.fail(`unknown argument ${name}`);
+  }
+  assert.ok(
+    found.reports.length > 0 || found.page,
+    "nothing to test: --report FILE or --page FILE",
+  );
+  return found;
+}
+
+async function takePictures(page, folder, name) {
+  if (!folder) return;
+  mkdirSync(folder, { recursive: true });
+  for (const [width, colorScheme] of [
+    [1440, "light"],
+    [1440, "dark"],
+    [390, "light"],
+  ]) {
+    await page.setViewportSize({ width, height: 900 });
+    await page.emulateMedia({ colorScheme });
+    await settled(page);
+    const file = `${name.replaceAll(/\W+/g, "_")}_${width}_${colorScheme}.png`;
+    await page.screenshot({ path: path.join(folder, file), fullPage: true });
+  }
+}
+
+/** All checks on one page, or those that depend on the data; returns the names of the failed. */
+async function checkReport(
+  browser,
+  file,
+  name,
+  { runJson = null, screenshots = null, isBrief = false } = {},
+) {
+  const failed = [];
+  const run = async (what, check) => {
+    let opened = null;
+    try {
+      opened = await open(browser, file);
+      const said = await check(opened.page);
+      assert.deepEqual(opened.faults, [], "the page did what it may not do");
+      console.log(`ok      ${name}: ${what}${said === undefined ? "" : ` (${said})`}`);
+    } catch (error) {
+      failed.push(`${name}: ${what}`);
+      console.log(
+        `FAILED  ${name}: ${what}\n        ${String(error.message).replaceAll("\n", "\n        ")}`,
+      );
+    } finally {
+      await opened?.close();
+    }
+  };
+  await run("numbers", (page) => checkNumbers(page, runJson));
+  await run("pairs", async (page) => `${await checkPairs(page)} times xi compared`);
+  await run("drawn", checkDrawn);
+  await run("clicks, hovering, zoom", checkViews);
+  await run("filters and arrow keys", checkFilters);
+  await run("true place", checkTruePlace);
+  if (isBrief) return failed;
+  await run("address", checkAddress);
+  await run("help and number", checkHelp);
+  await run("by Tab alone", async (page) => `${await checkTabs(page)} controls`);
+  await run("names", checkNames);
+  await run("widths", checkWidths);
+  await run("themes and contrast", checkThemes);
+  await run("paper", checkPaper);
+  if (screenshots) await run("pictures of it", (page) => takePictures(page, screenshots, name));
+  return failed;
+}
+
+/** 10,000 frames: how large, how soon on the screen, how soon after a key. */
+async function checkSpeed(browser, file) {
+  let opened = null;
+  try {
+    opened = await open(browser, file);
+    const { page, faults } = opened;
+    const { paint, done } = await page.evaluate(() => ({
+      paint: performance.getEntriesByName("first-contentful-paint")[0]?.startTime ?? Number.NaN,
+      done: performance.getEntriesByName("report-drawn")[0]?.startTime ?? Number.NaN,
+    }));
+    const times = [];
+    for (let i = 0; i < 21; ++i) {
+      times.push(
+        await page.evaluate(async () => {
+          const begin = performance.now();
+          dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowRight" }));
+          await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+          return performance.now() - begin;
+        }),
+      );
+    }
+    const select = times.sort((a, b) => a - b)[10];
+    const size = statSync(file).size / 1e6;
+    console.log(
+      `        10,000 frames: ${size.toFixed(1)} MB, first paint ${paint.toFixed(0)} ms, all drawn ${done.toFixed(0)} ms, a key ${select.toFixed(0)} ms`,
+    );
+    const { runs } = await embedded(page);
+    assert.equal(runs[0].frames, 10_000);
+    assert.deepEqual(faults, []);
+    console.log("ok      10,000 frames: speed");
+    return [];
+  } catch (error) {
+    console.log(`FAILED  10,000 frames: speed\n        ${error.message}`);
+    return ["10,000 frames: speed"];
+  } finally {
+    await opened?.close();
+  }
+}
+
+async function main() {
+  const wanted = argumentsOf(process.argv.slice(2));
+  const { screenshots } = wanted;
+  const scratch = mkdtempSync(path.join(tmpdir(), "loopbit_report_"));
+  const browser = await launch(wanted.playwright);
+  const failed = [];
+  try {
+    for (const { file, runJson } of wanted.reports) {
+      const record = runJson ? JSON.parse(readFileSync(runJson, "utf8")) : null;
+      const name = path.basename(path.dirname(path.resolve(file)));
+      failed.push(...(await checkReport(browser, file, name, { runJson: record, screenshots })));
+    }
+    if (wanted.page) {
+      const template = readFileSync(wanted.page, "utf8");
+      const file = path.join(scratch, "report.html");
+      for (const [name, options] of Object.entries(kSamples)) {
+        writeFileSync(file, pageWith(template, sampleData(options)));
+        failed.push(
+          ...(await checkReport(browser, file, name, {
+            screenshots,
+            isBrief: !kInFull.includes(name),
+          })),
+        );
+      }
+      writeFileSync(file, pageWith(template, sampleData({ frames: 10_000, picturesMb: 12 })));
+      failed.push(...(await checkSpeed(browser, file)));
+    }
+  } finally {
+    await browser.close();
+    rmSync(scratch, { recursive: true });
+  }
+  if (failed.length > 0) console.log(`\n${failed.length} failed:\n  ${failed.join("\n  ")}`);
+  process.exitCode = failed.length > 0 ? 1 : 0;
+}
+
+await main();

@@ -1,0 +1,21 @@
+#!/usr/bin/env bash
+# run.sh LOOPBIT WEB: tests the report page in a headless Chromium, on pages that LOOPBIT makes and on
+# made-up data in the page of the folder WEB, where it was built.
+set -euo pipefail
+
+loopbit=$1
+web=$2
+here=$(dirname "$(readlink -f "$0")")
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+world=(--frames 150 --world laps=2 --world spacing_m=1.5 --world width_px=320 --world height_px=240)
+"$loopbit" demo "${world[@]}" --out "$scratch/demo"
+"$loopbit" demo "${world[@]}" --set decision.min_score=60 --out "$scratch/strict"
+printf 'query,match,score\n120,45,0.9\n121,10,0.7\n' >"$scratch/other.csv"
+"$loopbit" compare "$scratch/demo" "$scratch/strict" "other=$scratch/other.csv" \
+  --out "$scratch/compared.html"
+
+node "$here/report_test.mjs" --playwright "$web/node_modules" --page "$web/dist/report.html" \
+  --report "$scratch/demo/report.html" --run-json "$scratch/demo/run.json" \
+  --report "$scratch/compared.html"
