@@ -67,8 +67,47 @@ void dot_products(const std::int8_t* descriptor, const std::int8_t* descriptors,
   }
 }
 
+/// The sum over one record, in four parts.
+__m256i min_sum_lanes(const std::uint8_t* query, const std::uint8_t* record) {
+  const auto minimum = [&](std::size_t at) {
+    return _mm256_min_epu8(load(query + at), load(record + at));
+  };
+  const __m256i low = _mm256_add_epi8(minimum(0), minimum(32));
+  const __m256i high = _mm256_add_epi8(minimum(64), minimum(96));
+  const __m256i zero = _mm256_setzero_si256();
+  return _mm256_add_epi64(_mm256_sad_epu8(low, zero), _mm256_sad_epu8(high, zero));
+}
+
+/// Four records side by side in 16-bit lanes, so that one reduction serves them all.
+void min_sums_of_four(const std::uint8_t* query, const std::uint8_t* records, std::uint16_t* sums) {
+  const __m256i a = min_sum_lanes(query, records);
+  const __m256i b = _mm256_slli_epi64(min_sum_lanes(query, records + kBlockCounts), 16);
+  const __m256i c = _mm256_slli_epi64(min_sum_lanes(query, records + 2 * kBlockCounts), 32);
+  const __m256i d = _mm256_slli_epi64(min_sum_lanes(query, records + 3 * kBlockCounts), 48);
+  const __m256i all = _mm256_or_si256(_mm256_or_si256(a, b), _mm256_or_si256(c, d));
+  __m128i sum = _mm_add_epi16(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1));
+  sum = _mm_add_epi16(sum, _mm_unpackhi_epi64(sum, sum));
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(sums), sum);
+}
+
+void min_sums(const std::uint8_t* const* queries, std::size_t num_queries,
+              const std::uint8_t* records, std::size_t num_records, std::uint16_t* sums) {
+  std::size_t i = 0;
+  for (; i + 4 <= num_records; i += 4) {
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      min_sums_of_four(queries[q], records + i * kBlockCounts, sums + q * num_records + i);
+    }
+  }
+  for (; i < num_records; ++i) {
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      const __m256i lanes = min_sum_lanes(queries[q], records + i * kBlockCounts);
+      sums[q * num_records + i] = static_cast<std::uint16_t>(sum_lanes_epi64(lanes));
+    }
+  }
+}
+
 }  // namespace
 
-const Kernels kAvx2Kernels{"avx2", max_overlaps<overlap>, dot_products};
+const Kernels kAvx2Kernels{"avx2", max_overlaps<overlap>, dot_products, min_sums};
 
 }  // namespace loopbit

@@ -11,10 +11,12 @@ namespace loopbit {
 
 /// 64-bit words in one binary content.
 inline constexpr std::size_t kContentWords = 64;
+/// 8-bit counts in one record of block counts.
+inline constexpr std::size_t kBlockCounts = 128;
 /// 8-bit values in one descriptor.
 inline constexpr std::size_t kDescriptorSize = 64;
 
-/// The two inner loops that decide the speed of loopbit, for one instruction set. All of them
+/// The inner loops that decide the speed of loopbit, for one instruction set. All of them
 /// return the same integers; the scalar one is the reference.
 struct Kernels {
   std::string_view name;
@@ -28,6 +30,12 @@ struct Kernels {
   /// products[i] = dot(descriptor, descriptors[i]), each descriptor 64 signed bytes in [-127, 127].
   void (*dot_products)(const std::int8_t* descriptor, const std::int8_t* descriptors,
                        std::size_t num_descriptors, std::int32_t* products);
+
+  /// sums[q * num_records + i] = sum over k of min(queries[q][k], records[i][k]), each record 128
+  /// counts in [0, 127], the records one after the other.
+  /// Cost: num_queries * num_records * 128 bytes of minimum and sum.
+  void (*min_sums)(const std::uint8_t* const* queries, std::size_t num_queries,
+                   const std::uint8_t* records, std::size_t num_records, std::uint16_t* sums);
 };
 
 /// The kernels this processor can run, slowest first: "scalar", "avx2", "avx512".
