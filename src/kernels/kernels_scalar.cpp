@@ -23,22 +23,26 @@ void dot_products(const std::int8_t* descriptor, const std::int8_t* descriptors,
   }
 }
 
-void min_sums(const std::uint8_t* const* queries, std::size_t num_queries,
-              const std::uint8_t* records, std::size_t num_records, std::uint16_t* sums) {
-  for (std::size_t q = 0; q < num_queries; ++q) {
-    for (std::size_t i = 0; i < num_records; ++i) {
-      const std::uint8_t* record = records + i * kBlockCounts;
-      unsigned sum = 0;
-      for (std::size_t k = 0; k < kBlockCounts; ++k) {
-        sum += queries[q][k] < record[k] ? queries[q][k] : record[k];
-      }
-      sums[q * num_records + i] = static_cast<std::uint16_t>(sum);
+unsigned min_sum(const std::uint8_t* a, const std::uint8_t* b) {
+  unsigned sum = 0;
+  for (std::size_t k = 0; k < kBlockCounts; ++k) sum += a[k] < b[k] ? a[k] : b[k];
+  return sum;
+}
+
+void max_min_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* records,
+                  std::size_t num_records, std::uint16_t* largest) {
+  for (std::size_t i = 0; i < num_records; ++i) {
+    unsigned best = 0;
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      const unsigned sum = min_sum(queries + q * kBlockCounts, records + i * kBlockCounts);
+      best = sum > best ? sum : best;
     }
+    largest[i] = static_cast<std::uint16_t>(best);
   }
 }
 
 }  // namespace
 
-const Kernels kScalarKernels{"scalar", max_overlaps<overlap>, dot_products, min_sums};
+const Kernels kScalarKernels{"scalar", max_overlaps<overlap>, dot_products, max_min_sums};
 
 }  // namespace loopbit

@@ -24,12 +24,6 @@ FoundPlaces::FoundPlaces(const RetrievalOptions& options)
       min_spacing_(options.min_spacing),
       floor_{std::numeric_limits<PlaceId>::max(), options.min_similarity} {}
 
-int FoundPlaces::least_overlap(int larger_count) const {
-  int overlap = static_cast<int>(floor_.similarity * larger_count);
-  if (static_cast<double>(overlap) / larger_count < floor_.similarity) ++overlap;
-  return std::max(overlap, 1);
-}
-
 void FoundPlaces::add(const Candidate& candidate) {
   found_.push_back(candidate);
   raise_floor(candidate);

@@ -30,8 +30,11 @@ class FoundPlaces {
            (similarity == floor_.similarity && place <= floor_.place);
   }
 
-  /// The least overlap that can matter where max(|O1|, |O2|) is `larger_count`, at least 1.
-  [[nodiscard]] int least_overlap(int larger_count) const;
+  /// Whether overlap / larger_count is certainly below the floor; quicker than dividing.
+  [[nodiscard]] bool is_below_floor(int overlap, int larger_count) const {
+    constexpr double kRoundingMargin = 1.0 - 1e-12;
+    return overlap < floor_.similarity * kRoundingMargin * larger_count;
+  }
 
   /// Takes note of a candidate that may matter. Cost: linear in max_candidates.
   void add(const Candidate& candidate);

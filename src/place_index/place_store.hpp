@@ -20,8 +20,14 @@ namespace loopbit {
 
 /// Consecutive places bounded together, coarse to fine. Neighbours in time look alike, so that the
 /// maximum over a stretch is little more than any of its places.
+inline constexpr std::array<std::size_t, 4> kStretchBits{9, 5, 3, 1};
 inline constexpr std::array<std::size_t, 4> kStretchPlaces{512, 32, 8, 2};
 inline constexpr std::size_t kFinestLevel = kStretchPlaces.size() - 1;
+
+struct StretchBounds {
+  const BlockCounts* maxima;             ///< the largest block counts among its places
+  const std::uint16_t* smallest_counts;  ///< the smallest |O| among them
+};
 
 /// The contents of all places, their counts, and bounds for stretches of them. Stretch i of a level
 /// with n places a stretch holds the places i * n to (i + 1) * n - 1.
@@ -51,20 +57,15 @@ class PlaceStore {
   [[nodiscard]] int count(std::size_t place) const {
     return chunks_[place / kChunkPlaces].bounds->counts[place % kChunkPlaces];
   }
-  /// The largest block counts among the places of a stretch. Those of stretches that begin in one
-  /// chunk follow each other.
-  [[nodiscard]] const BlockCounts& maxima(std::size_t level, std::size_t stretch) const {
-    const auto at = position(level, stretch);
-    return at.bounds->maxima[at.record];
-  }
-  /// The smallest |O| among the places of a stretch.
-  [[nodiscard]] int smallest_count(std::size_t level, std::size_t stretch) const {
-    const auto at = position(level, stretch);
-    return at.bounds->smallest_counts[at.record];
+  /// The bounds of a stretch, and, up to the end of the chunk, of those after it.
+  [[nodiscard]] StretchBounds bounds(std::size_t level, std::size_t stretch) const {
+    const Position at = position(level, stretch);
+    return {&at.bounds->maxima[at.record], &at.bounds->smallest_counts[at.record]};
   }
 
  private:
-  static constexpr std::size_t kChunkPlaces = 65'536;
+  static constexpr std::size_t kChunkBits = 16;
+  static constexpr std::size_t kChunkPlaces = std::size_t{1} << kChunkBits;
   static constexpr std::size_t kMaxChunks = (std::size_t{1} << 31U) / kChunkPlaces;
 
   /// Where the records of each level begin in a chunk, and, last, how many there are.
@@ -95,8 +96,9 @@ class PlaceStore {
   };
 
   [[nodiscard]] Position position(std::size_t level, std::size_t stretch) const {
-    const std::size_t in_chunk = kChunkPlaces / kStretchPlaces[level];
-    return {chunks_[stretch / in_chunk].bounds, kFirstRecord[level] + stretch % in_chunk};
+    const std::size_t bits = kChunkBits - kStretchBits[level];
+    const std::size_t in_chunk = stretch & ((std::size_t{1} << bits) - 1);
+    return {chunks_[stretch >> bits].bounds, kFirstRecord[level] + in_chunk};
   }
   void take_chunk(std::size_t number);
   void extend_stretches(std::size_t place, const BinaryContent& content, std::uint16_t count);

@@ -10,11 +10,8 @@
 namespace loopbit {
 namespace {
 
-/// Neighbouring shifts that are bounded together in all but the finest stretches.
+/// Neighbouring shifts that are bounded together first.
 constexpr std::size_t kShiftsPerGroup = 3;
-constexpr std::size_t kMaxShifts = 2 * 32 + 1;
-constexpr std::uint32_t kAllGroups = ~std::uint32_t{0};
-static_assert(kMaxShifts <= 32 * kShiftsPerGroup, "a group has a bit in 32");
 
 /// Stretches whose bounds are computed by one call of a kernel.
 constexpr std::size_t kRun = 16;
@@ -23,7 +20,7 @@ constexpr std::size_t kRun = 16;
 constexpr std::size_t kSortedLevel = 1;
 /// So many of them go first, then kBatchGrowth times as many, and so on.
 constexpr std::size_t kFirstBatch = 64;
-constexpr std::size_t kBatchGrowth = 4;
+constexpr std::size_t kBatchGrowth = 16;
 /// So many are descended into together.
 constexpr std::size_t kSlice = 64;
 
@@ -52,15 +49,10 @@ PrunedSearch::PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryCon
 
 void PrunedSearch::prepare_shifts(const BinaryContent& query, int tolerance_columns) {
   for (int columns = -tolerance_columns; columns <= tolerance_columns; ++columns) {
-    const auto group = static_cast<std::uint32_t>(shifted_.size() / kShiftsPerGroup);
+    if (shifted_.size() % kShiftsPerGroup == 0) group_counts_.emplace_back();
     shifted_.push_back(shift_columns(query, columns));
-    single_.counts.push_back(block_counts(shifted_.back()));
-    single_.groups.push_back(group);
-    if (group == grouped_.counts.size()) {
-      grouped_.counts.emplace_back();
-      grouped_.groups.push_back(group);
-    }
-    raise(grouped_.counts.back(), single_.counts.back());
+    shift_counts_.push_back(block_counts(shifted_.back()));
+    raise(group_counts_.back(), shift_counts_.back());
   }
 }
 
@@ -68,7 +60,7 @@ std::vector<Candidate> PrunedSearch::run() {
   std::vector<Stretch> coarsest;
   const std::size_t stretches = end_ / kStretchPlaces.front();
   for (std::size_t first = 0; first < stretches; first += kRun) {
-    bound_run(0, first, std::min(first + kRun, stretches), kAllGroups, coarsest);
+    bound_run(0, first, std::min(first + kRun, stretches), coarsest);
   }
   // The most promising stretch gives a first floor, below which many others need no look inside.
   const auto best =
@@ -82,50 +74,38 @@ std::vector<Candidate> PrunedSearch::run() {
   search_rest();
   std::vector<Stretch> finer;
   bound_children(0, coarsest, finer);
-  search_best_first(kSortedLevel, finer);
+  search_best_first(kSortedLevel, std::move(finer));
   return std::move(found_).answer();
 }
 
-bool PrunedSearch::may_matter(std::size_t level, const Stretch& stretch) const {
-  const std::size_t first = stretch.number * kStretchPlaces[level];
-  return found_.may_matter(stretch.bound, static_cast<PlaceId>(first));
-}
-
 /// Bounds the stretches first to last - 1, at most kRun, of one chunk, and appends to `kept` those
-/// that may matter.
+/// that may matter: by groups of shifts, and those that are left by each shift.
 void PrunedSearch::bound_run(std::size_t level, std::size_t first, std::size_t last,
-                             std::uint32_t groups, std::vector<Stretch>& kept) {
+                             std::vector<Stretch>& kept) {
   if (first >= last) return;
-  const Variants& variants = level == kFinestLevel ? single_ : grouped_;
-  std::array<const std::uint8_t*, kMaxShifts> queries{};
-  std::array<std::uint32_t, kMaxShifts> groups_of{};
-  std::size_t num_queries = 0;
-  for (std::size_t v = 0; v < variants.counts.size(); ++v) {
-    if (((groups >> variants.groups[v]) & 1U) == 0) continue;
-    queries[num_queries] = variants.counts[v].of.data();
-    groups_of[num_queries++] = variants.groups[v];
-  }
   const std::size_t run = last - first;
-  std::array<std::uint16_t, kMaxShifts * kRun> sums;  // NOLINT: written to before it is read
-  kernels_.min_sums(queries.data(), num_queries, store_.maxima(level, first).of.data(), run,
-                    sums.data());
+  const StretchBounds bounds = store_.bounds(level, first);
+  std::array<std::uint16_t, kRun> overlaps;  // NOLINT: written to before it is read
+  kernels_.max_min_sums(group_counts_.front().of.data(), group_counts_.size(),
+                        bounds.maxima->of.data(), run, overlaps.data());
   work_.stretches[level] += static_cast<std::int64_t>(run);
 
   for (std::size_t i = 0; i < run; ++i) {
-    const int larger = std::max(query_count_, store_.smallest_count(level, first + i));
-    const int least = found_.least_overlap(larger);
-    std::uint32_t kept_groups = 0;
-    int overlap = 0;
-    for (std::size_t q = 0; q < num_queries; ++q) {
-      const int sum = sums[q * run + i];
-      kept_groups |= static_cast<std::uint32_t>(sum >= least) << groups_of[q];
-      overlap = std::max(overlap, sum);
-    }
-    if (kept_groups == 0) continue;
-    const double bound = static_cast<double>(std::min(overlap, query_count_)) / larger;
-    const Stretch stretch{static_cast<std::uint32_t>(first + i), kept_groups, bound};
-    if (may_matter(level, stretch)) kept.push_back(stretch);
+    const int larger = std::max<int>(query_count_, bounds.smallest_counts[i]);
+    if (found_.is_below_floor(overlaps[i], larger)) continue;
+    bound_single_shifts(level, static_cast<std::uint32_t>(first + i), bounds.maxima[i], larger,
+                        kept);
   }
+}
+
+void PrunedSearch::bound_single_shifts(std::size_t level, std::uint32_t number,
+                                       const BlockCounts& maxima, int larger_count,
+                                       std::vector<Stretch>& kept) {
+  std::uint16_t overlap = 0;
+  kernels_.max_min_sums(shift_counts_.front().of.data(), shift_counts_.size(), maxima.of.data(), 1,
+                        &overlap);
+  const Stretch stretch{static_cast<double>(overlap) / larger_count, number};
+  if (overlap > 0 && may_matter(level, stretch)) kept.push_back(stretch);
 }
 
 /// Appends to `kept` the stretches of the next level within `parents` that may matter.
@@ -134,12 +114,12 @@ void PrunedSearch::bound_children(std::size_t level, std::span<const Stretch> pa
   const std::size_t children = kStretchPlaces[level] / kStretchPlaces[level + 1];
   for (std::size_t i = 0; i < parents.size(); ++i) {
     if (i + kAhead < parents.size()) {
-      prefetch(&store_.maxima(level + 1, parents[i + kAhead].number * children),
+      prefetch(store_.bounds(level + 1, parents[i + kAhead].number * children).maxima,
                children * sizeof(BlockCounts));
     }
     if (!may_matter(level, parents[i])) continue;
     const std::size_t first = parents[i].number * children;
-    bound_run(level + 1, first, first + children, parents[i].groups, kept);
+    bound_run(level + 1, first, first + children, kept);
   }
 }
 
@@ -160,13 +140,13 @@ void PrunedSearch::descend(std::size_t level, std::span<const Stretch> stretches
     }
     if (!may_matter(level, stretches[i])) continue;
     const std::size_t first = stretches[i].number * kPlaces;
-    compare(first, first + kPlaces, stretches[i].groups);
+    compare(first, first + kPlaces);
   }
 }
 
 /// Searches stretches, those of large bounds first, so that the floor soon rises above the bounds
 /// of the rest. Batches by bound, each in the order of places, take less time than sorting.
-void PrunedSearch::search_best_first(std::size_t level, const std::vector<Stretch>& stretches) {
+void PrunedSearch::search_best_first(std::size_t level, std::vector<Stretch> stretches) {
   constexpr std::size_t kBuckets = 1024;
   const auto bucket_of = [](const Stretch& stretch) {
     return std::min(static_cast<std::size_t>(stretch.bound * kBuckets), kBuckets - 1);
@@ -175,21 +155,20 @@ void PrunedSearch::search_best_first(std::size_t level, const std::vector<Stretc
   for (const Stretch& stretch : stretches) ++sizes[bucket_of(stretch)];
 
   std::vector<Stretch> batch;
+  std::vector<Stretch> rest;
   std::size_t wanted = kFirstBatch;
-  for (std::size_t end = kBuckets; end > 0; wanted *= kBatchGrowth) {
-    std::size_t begin = end;
-    for (std::size_t got = 0; begin > 0 && got < wanted;) got += sizes[--begin];
+  for (std::size_t end = kBuckets; !stretches.empty(); wanted *= kBatchGrowth) {
+    for (std::size_t got = 0; end > 0 && got < wanted;) got += sizes[--end];
     batch.clear();
+    rest.clear();
     for (const Stretch& stretch : stretches) {
-      const std::size_t bucket = bucket_of(stretch);
-      if (begin <= bucket && bucket < end && may_matter(level, stretch)) batch.push_back(stretch);
+      if (may_matter(level, stretch)) (bucket_of(stretch) < end ? rest : batch).push_back(stretch);
     }
+    stretches.swap(rest);
     const std::span<const Stretch> all = batch;
     for (std::size_t first = 0; first < all.size(); first += kSlice) {
       descend(level, all.subspan(first, std::min(kSlice, all.size() - first)));
     }
-    end = begin;
-    if (static_cast<double>(end) < found_.floor().similarity * kBuckets) break;
   }
 }
 
@@ -200,30 +179,22 @@ void PrunedSearch::search_rest() {
     const std::size_t first = searched / kStretchPlaces[level];
     const std::size_t last = end_ / kStretchPlaces[level];
     std::vector<Stretch> stretches;
-    bound_run(level, first, last, kAllGroups, stretches);
+    bound_run(level, first, last, stretches);
     descend(level, stretches);
     searched = last * kStretchPlaces[level];
   }
-  compare(searched, end_, kAllGroups);
+  compare(searched, end_);
 }
 
-/// Compares the contents of places, at most two, of one chunk, with the query at the shifts of
-/// `groups`.
-void PrunedSearch::compare(std::size_t first, std::size_t last, std::uint32_t groups) {
+/// Compares the contents of places, at most two, of one chunk, with the query at each shift.
+void PrunedSearch::compare(std::size_t first, std::size_t last) {
   if (first >= last) return;
   std::array<std::uint16_t, kStretchPlaces[kFinestLevel]> overlaps{};
-  std::array<int, kStretchPlaces[kFinestLevel]> best{};
-  for (std::size_t group = 0; group < grouped_.counts.size(); ++group) {
-    if (((groups >> group) & 1U) == 0) continue;
-    const std::size_t shift = group * kShiftsPerGroup;
-    kernels_.max_overlaps(shifted_[shift].rows.data(),
-                          std::min(kShiftsPerGroup, shifted_.size() - shift),
-                          store_.content(first).rows.data(), last - first, overlaps.data());
-    for (std::size_t i = 0; i < best.size(); ++i) best[i] = std::max<int>(best[i], overlaps[i]);
-  }
+  kernels_.max_overlaps(shifted_.front().rows.data(), shifted_.size(),
+                        store_.content(first).rows.data(), last - first, overlaps.data());
   work_.contents += static_cast<std::int64_t>(last - first);
   for (std::size_t place = first; place < last; ++place) {
-    const int overlap = best[place - first];
+    const int overlap = overlaps[place - first];
     if (overlap == 0) continue;
     const double xi = static_cast<double>(overlap) / std::max(query_count_, store_.count(place));
     const Candidate candidate{static_cast<PlaceId>(place), xi};

@@ -37,26 +37,25 @@ class PrunedSearch {
 
  private:
   struct Stretch {
+    double bound;  ///< of xi
     std::uint32_t number;
-    std::uint32_t groups;  ///< of shifts, a bit each, that may matter
-    double bound;          ///< of xi
-  };
-  /// Block counts of the query, for some shifts each, and the group each belongs to.
-  struct Variants {
-    std::vector<BlockCounts> counts;
-    std::vector<std::uint32_t> groups;
   };
 
   void prepare_shifts(const BinaryContent& query, int tolerance_columns);
-  [[nodiscard]] bool may_matter(std::size_t level, const Stretch& stretch) const;
-  void bound_run(std::size_t level, std::size_t first, std::size_t last, std::uint32_t groups,
+  [[nodiscard]] bool may_matter(std::size_t level, const Stretch& stretch) const {
+    const std::size_t first = std::size_t{stretch.number} << kStretchBits[level];
+    return found_.may_matter(stretch.bound, static_cast<PlaceId>(first));
+  }
+  void bound_run(std::size_t level, std::size_t first, std::size_t last,
                  std::vector<Stretch>& kept);
+  void bound_single_shifts(std::size_t level, std::uint32_t number, const BlockCounts& maxima,
+                           int larger_count, std::vector<Stretch>& kept);
   void bound_children(std::size_t level, std::span<const Stretch> parents,
                       std::vector<Stretch>& kept);
   void descend(std::size_t level, std::span<const Stretch> stretches);
-  void search_best_first(std::size_t level, const std::vector<Stretch>& stretches);
+  void search_best_first(std::size_t level, std::vector<Stretch> stretches);
   void search_rest();
-  void compare(std::size_t first, std::size_t last, std::uint32_t groups);
+  void compare(std::size_t first, std::size_t last);
   [[nodiscard]] bool is_within_limits(std::size_t place) const;
 
   const PlaceStore& store_;
@@ -65,9 +64,9 @@ class PrunedSearch {
   std::size_t end_;
   int query_count_;
   cv::Point2d query_center_;
-  std::vector<BinaryContent> shifted_;  ///< the query at each shift
-  Variants single_;                     ///< a variant a shift
-  Variants grouped_;                    ///< a variant a group of shifts
+  std::vector<BinaryContent> shifted_;     ///< the query at each shift
+  std::vector<BlockCounts> shift_counts_;  ///< of shifted_
+  std::vector<BlockCounts> group_counts_;  ///< for each group of neighbouring shifts, the maxima
   FoundPlaces found_;
   std::array<std::vector<Stretch>, kStretchPlaces.size()> children_;  ///< scratch, by level
   RetrievalWork work_;

@@ -31,11 +31,12 @@ struct Kernels {
   void (*dot_products)(const std::int8_t* descriptor, const std::int8_t* descriptors,
                        std::size_t num_descriptors, std::int32_t* products);
 
-  /// sums[q * num_records + i] = sum over k of min(queries[q][k], records[i][k]), each record 128
-  /// counts in [0, 127], the records one after the other.
+  /// largest[i] = max over q of the sum over k of min(queries[q][k], records[i][k]), each of the
+  /// queries and of the records 128 counts in [0, 127].
   /// Cost: num_queries * num_records * 128 bytes of minimum and sum.
-  void (*min_sums)(const std::uint8_t* const* queries, std::size_t num_queries,
-                   const std::uint8_t* records, std::size_t num_records, std::uint16_t* sums);
+  void (*max_min_sums)(const std::uint8_t* queries, std::size_t num_queries,
+                       const std::uint8_t* records, std::size_t num_records,
+                       std::uint16_t* largest);
 };
 
 /// The kernels this processor can run, slowest first: "scalar", "avx2", "avx512".
