@@ -62,7 +62,7 @@ TEST_P(PrunedSearchTest, OfRandomPlaces) {
 
 TEST_P(PrunedSearchTest, OfACoherentSequence) {
   Random random;
-  Contents places = coherent_contents(random, 1'000);
+  Contents places = coherent_contents(random, 1'400);
   const Contents again(places.begin() + 100, places.begin() + 400);  // a second lap
   places.insert(places.end(), again.begin(), again.end());
   expect_as_full_scan(places, {places[0], places[333], shift_columns(places[700], -2),

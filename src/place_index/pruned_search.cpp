@@ -58,9 +58,9 @@ void PrunedSearch::prepare_shifts(const BinaryContent& query, int tolerance_colu
 
 std::vector<Candidate> PrunedSearch::run() {
   std::vector<Stretch> coarsest;
-  const std::size_t stretches = end_ / kStretchPlaces.front();
-  for (std::size_t first = 0; first < stretches; first += kRun) {
-    bound_run(0, first, std::min(first + kRun, stretches), coarsest);
+  const std::size_t whole = end_ / kStretchPlaces.front();
+  for (std::size_t first = 0; first < whole; first += kRun) {
+    bound_run(0, first, std::min(first + kRun, whole), coarsest);
   }
   // The most promising stretch gives a first floor, below which many others need no look inside.
   const auto best =
