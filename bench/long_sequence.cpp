@@ -17,7 +17,7 @@ constexpr std::size_t kSegment = 100;  ///< key frames
 constexpr int kTownKeyFrames = 1'500;
 constexpr std::size_t kFields = 64;
 constexpr float kLapDifference = 0.3F;
-constexpr float kFlicker = 0.05F;
+constexpr float kFlicker = 0.08F;
 
 /// A well-mixed 64-bit number (Steele, Lea, Flood, "Fast splittable pseudorandom number
 /// generators", 2014).
@@ -159,6 +159,10 @@ BinaryContent LongSequence::revisit(std::size_t number) const {
   Saliency saliency = in_its_lap(number);
   disturb(saliency, fields_, mixed(number), kLapDifference);
   return shift_columns(content_of(saliency), static_cast<int>(number % 5) - 2);
+}
+
+BinaryContent LongSequence::key_frame_of_lap(std::size_t number) const {
+  return content_of(in_its_lap(number));
 }
 
 BinaryContent LongSequence::key_frame(std::size_t number) const {

@@ -42,6 +42,9 @@ class LongSequence {
   /// real set gets another smooth field, and is shifted sideways by up to 2 columns.
   [[nodiscard]] BinaryContent revisit(std::size_t number) const;
 
+  /// Key frame `number` as its lap has it.
+  [[nodiscard]] BinaryContent key_frame_of_lap(std::size_t number) const;
+
   /// Key frame `number` as it is.
   [[nodiscard]] BinaryContent key_frame(std::size_t number) const;
 

@@ -19,13 +19,20 @@ constexpr std::size_t kRun = 16;
 /// The level whose stretches are searched best first.
 constexpr std::size_t kSortedLevel = 1;
 /// So many of them go first, then kBatchGrowth times as many, and so on.
-constexpr std::size_t kFirstBatch = 64;
-constexpr std::size_t kBatchGrowth = 16;
+constexpr std::size_t kFirstBatch = 8;
+constexpr std::size_t kBatchGrowth = 8;
 /// So many are descended into together.
-constexpr std::size_t kSlice = 64;
+constexpr std::size_t kSlice = 8;
 
 /// Memory is asked for so many stretches ahead of its use.
 constexpr std::size_t kAhead = 6;
+
+constexpr std::size_t kFinestPlaces = kStretchPlaces[kFinestLevel];
+
+template <typename Stretch>
+bool has_larger_bound(const Stretch& a, const Stretch& b) {
+  return a.bound > b.bound;
+}
 
 void prefetch(const void* begin, std::size_t size_bytes) {
   constexpr std::size_t kLine_bytes = 64;
@@ -57,25 +64,27 @@ void PrunedSearch::prepare_shifts(const BinaryContent& query, int tolerance_colu
 }
 
 std::vector<Candidate> PrunedSearch::run() {
-  std::vector<Stretch> coarsest;
+  std::vector<Stretch> coarse;
   const std::size_t whole = end_ / kStretchPlaces.front();
   for (std::size_t first = 0; first < whole; first += kRun) {
-    bound_run(0, first, std::min(first + kRun, whole), coarsest);
+    bound_run(0, first, std::min(first + kRun, whole), coarse);
   }
   // The most promising stretch gives a first floor, below which many others need no look inside.
-  const auto best =
-      std::max_element(coarsest.begin(), coarsest.end(),
-                       [](const Stretch& a, const Stretch& b) { return a.bound < b.bound; });
-  if (best != coarsest.end()) {
-    const Stretch first = *best;
-    coarsest.erase(best);
-    descend(0, {&first, 1});
+  if (!coarse.empty()) {
+    const auto best = std::min_element(coarse.begin(), coarse.end(), has_larger_bound<Stretch>);
+    search_inside({*best});
+    coarse.erase(best);
   }
   search_rest();
-  std::vector<Stretch> finer;
-  bound_children(0, coarsest, finer);
-  search_best_first(kSortedLevel, std::move(finer));
+  search_inside(coarse);
   return std::move(found_).answer();
+}
+
+/// Searches coarsest stretches.
+void PrunedSearch::search_inside(const std::vector<Stretch>& coarse) {
+  std::vector<Stretch> finer;
+  bound_children(0, coarse, finer);
+  search_best_first(kSortedLevel, std::move(finer));
 }
 
 /// Bounds the stretches first to last - 1, at most kRun, of one chunk, and appends to `kept` those
@@ -124,7 +133,7 @@ void PrunedSearch::bound_children(std::size_t level, std::span<const Stretch> pa
 }
 
 /// Searches stretches down to their places.
-void PrunedSearch::descend(std::size_t level, std::span<const Stretch> stretches) {
+void PrunedSearch::descend(std::size_t level, std::span<Stretch> stretches) {
   if (level < kFinestLevel) {
     std::vector<Stretch>& children = children_[level + 1];
     children.clear();
@@ -132,15 +141,13 @@ void PrunedSearch::descend(std::size_t level, std::span<const Stretch> stretches
     descend(level + 1, children);
     return;
   }
-  constexpr std::size_t kPlaces = kStretchPlaces[kFinestLevel];
+  std::sort(stretches.begin(), stretches.end(), has_larger_bound<Stretch>);
   for (std::size_t i = 0; i < stretches.size(); ++i) {
     if (i + kAhead < stretches.size()) {
-      prefetch(&store_.content(stretches[i + kAhead].number * kPlaces),
-               kPlaces * sizeof(BinaryContent));
+      prefetch(&store_.content(stretches[i + kAhead].number * kFinestPlaces),
+               kFinestPlaces * sizeof(BinaryContent));
     }
-    if (!may_matter(level, stretches[i])) continue;
-    const std::size_t first = stretches[i].number * kPlaces;
-    compare(first, first + kPlaces);
+    if (may_matter(level, stretches[i])) compare_stretch(stretches[i].number);
   }
 }
 
@@ -165,7 +172,7 @@ void PrunedSearch::search_best_first(std::size_t level, std::vector<Stretch> str
       if (may_matter(level, stretch)) (bucket_of(stretch) < end ? rest : batch).push_back(stretch);
     }
     stretches.swap(rest);
-    const std::span<const Stretch> all = batch;
+    const std::span<Stretch> all = batch;
     for (std::size_t first = 0; first < all.size(); first += kSlice) {
       descend(level, all.subspan(first, std::min(kSlice, all.size() - first)));
     }
@@ -183,23 +190,43 @@ void PrunedSearch::search_rest() {
     descend(level, stretches);
     searched = last * kStretchPlaces[level];
   }
-  compare(searched, end_);
+  if (searched < end_) compare_place(searched);
 }
 
-/// Compares the contents of places, at most two, of one chunk, with the query at each shift.
-void PrunedSearch::compare(std::size_t first, std::size_t last) {
-  if (first >= last) return;
-  std::array<std::uint16_t, kStretchPlaces[kFinestLevel]> overlaps{};
-  kernels_.max_overlaps(shifted_.front().rows.data(), shifted_.size(),
-                        store_.content(first).rows.data(), last - first, overlaps.data());
-  work_.contents += static_cast<std::int64_t>(last - first);
-  for (std::size_t place = first; place < last; ++place) {
-    const int overlap = overlaps[place - first];
-    if (overlap == 0) continue;
-    const double xi = static_cast<double>(overlap) / std::max(query_count_, store_.count(place));
-    const Candidate candidate{static_cast<PlaceId>(place), xi};
-    if (found_.may_matter(xi, candidate.place) && is_within_limits(place)) found_.add(candidate);
+/// Compares the contents of a finest stretch with the query at the shifts that may matter.
+void PrunedSearch::compare_stretch(std::size_t number) {
+  const StretchBounds bounds = store_.bounds(kFinestLevel, number);
+  const int larger = std::max<int>(query_count_, *bounds.smallest_counts);
+  // The kernel takes the stretch for the query, which makes a sum of each shift.
+  shift_sums_.resize(shift_counts_.size());
+  kernels_.max_min_sums(bounds.maxima->of.data(), 1, shift_counts_.front().of.data(),
+                        shift_counts_.size(), shift_sums_.data());
+  const std::size_t first = number * kFinestPlaces;
+  std::array<std::uint16_t, kFinestPlaces> best{};
+  for (std::size_t shift = 0; shift < shifted_.size(); ++shift) {
+    if (found_.is_below_floor(shift_sums_[shift], larger)) continue;
+    std::array<std::uint16_t, kFinestPlaces> overlaps{};
+    kernels_.max_overlaps(shifted_[shift].rows.data(), 1, store_.content(first).rows.data(),
+                          kFinestPlaces, overlaps.data());
+    for (std::size_t i = 0; i < kFinestPlaces; ++i) best[i] = std::max(best[i], overlaps[i]);
   }
+  work_.contents += std::int64_t{kFinestPlaces};
+  for (std::size_t i = 0; i < kFinestPlaces; ++i) consider(first + i, best[i]);
+}
+
+void PrunedSearch::compare_place(std::size_t place) {
+  std::uint16_t overlap = 0;
+  kernels_.max_overlaps(shifted_.front().rows.data(), shifted_.size(),
+                        store_.content(place).rows.data(), 1, &overlap);
+  ++work_.contents;
+  consider(place, overlap);
+}
+
+void PrunedSearch::consider(std::size_t place, int overlap) {
+  if (overlap == 0) return;
+  const double xi = static_cast<double>(overlap) / std::max(query_count_, store_.count(place));
+  const Candidate candidate{static_cast<PlaceId>(place), xi};
+  if (found_.may_matter(xi, candidate.place) && is_within_limits(place)) found_.add(candidate);
 }
 
 bool PrunedSearch::is_within_limits(std::size_t place) const {

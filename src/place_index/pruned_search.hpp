@@ -52,10 +52,13 @@ class PrunedSearch {
                            int larger_count, std::vector<Stretch>& kept);
   void bound_children(std::size_t level, std::span<const Stretch> parents,
                       std::vector<Stretch>& kept);
-  void descend(std::size_t level, std::span<const Stretch> stretches);
+  void descend(std::size_t level, std::span<Stretch> stretches);
+  void search_inside(const std::vector<Stretch>& coarse);
   void search_best_first(std::size_t level, std::vector<Stretch> stretches);
   void search_rest();
-  void compare(std::size_t first, std::size_t last);
+  void compare_stretch(std::size_t number);
+  void compare_place(std::size_t place);
+  void consider(std::size_t place, int overlap);
   [[nodiscard]] bool is_within_limits(std::size_t place) const;
 
   const PlaceStore& store_;
@@ -66,6 +69,7 @@ class PrunedSearch {
   cv::Point2d query_center_;
   std::vector<BinaryContent> shifted_;     ///< the query at each shift
   std::vector<BlockCounts> shift_counts_;  ///< of shifted_
+  std::vector<std::uint16_t> shift_sums_;  ///< scratch, by shift
   std::vector<BlockCounts> group_counts_;  ///< for each group of neighbouring shifts, the maxima
   FoundPlaces found_;
   std::array<std::vector<Stretch>, kStretchPlaces.size()> children_;  ///< scratch, by level
