@@ -3,7 +3,9 @@
 // The search with bounds against a naive full scan, on maps of many stretches, with each kernel.
 #include "pruned_search.hpp"
 
+#include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -131,6 +133,27 @@ TEST_P(PrunedSearchTest, AcrossChunksOfMemory) {
 INSTANTIATE_TEST_SUITE_P(Kernels, PrunedSearchTest,
                          testing::ValuesIn(available_kernels().begin(), available_kernels().end()),
                          [](const auto& kernels) { return std::string(kernels.param->name); });
+
+TEST(FoundPlaces, LeaveRoomForAPlaceThatKeepsSeveralOut) {
+  FoundPlaces found({.max_candidates = 2, .min_similarity = 0.0, .min_spacing = 3});
+  found.add({0, 0.8});
+  found.add({3, 0.7});
+  // These two are far enough apart for the answer, but a better one may yet keep both out.
+  EXPECT_TRUE(found.may_matter(0.6, 10));
+  found.add({2, 0.9});
+  found.add({10, 0.6});
+  EXPECT_EQ(std::move(found).answer(), (std::vector<Candidate>{{2, 0.9}, {10, 0.6}}));
+}
+
+TEST(FoundPlaces, LeaveOutWhatNoOrderOfThePlacesCanBring) {
+  FoundPlaces found({.max_candidates = 2, .min_similarity = 0.0, .min_spacing = 3});
+  found.add({0, 0.8});
+  found.add({5, 0.7});
+  EXPECT_FALSE(found.may_matter(0.699, 0));
+  EXPECT_TRUE(found.may_matter(0.7, 4));
+  EXPECT_FALSE(found.may_matter(0.7, 6));  // of equals, the earlier is in the answer
+  EXPECT_TRUE(found.may_matter(0.701, 1'000));
+}
 
 TEST(BlockCounts, BoundTheOverlap) {
   Random random;
