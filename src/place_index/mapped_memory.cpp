@@ -41,7 +41,7 @@ void MappedMemory::prefer_large_pages() {
   static_cast<void>(::madvise(data_, size_bytes_, MADV_HUGEPAGE));
 }
 
-ScratchFile::ScratchFile(const std::string& folder) : folder_(folder), descriptor_(-1) {
+ScratchFile::ScratchFile(const std::string& folder) : folder_(folder) {
   std::string name = folder + "/loopbit_places_XXXXXX";
   descriptor_ = ::mkostemp(name.data(), O_CLOEXEC);
   if (descriptor_ < 0) throw cannot_write(folder, errno);

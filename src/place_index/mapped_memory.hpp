@@ -52,7 +52,7 @@ class ScratchFile {
 
  private:
   std::string folder_;
-  int descriptor_;
+  int descriptor_ = -1;
   std::size_t size_bytes_ = 0;
 };
 

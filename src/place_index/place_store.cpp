@@ -15,12 +15,11 @@ constexpr std::size_t kFirstChunkOfLargePages = 4;
 
 }  // namespace
 
-// The table of chunks is not touched before it is needed: new memory of that size costs nothing.
-PlaceStore::PlaceStore() : chunks_(std::make_unique_for_overwrite<Chunk[]>(kMaxChunks)) {}
+PlaceStore::PlaceStore() : PlaceStore(nullptr) {}
 
-PlaceStore::PlaceStore(std::unique_ptr<ScratchFile> file) : PlaceStore() {
-  file_ = std::move(file);
-}
+// The table of chunks is not touched before it is needed: new memory of that size costs nothing.
+PlaceStore::PlaceStore(std::unique_ptr<ScratchFile> file)
+    : file_(std::move(file)), chunks_(std::make_unique_for_overwrite<Chunk[]>(kMaxChunks)) {}
 
 PlaceId PlaceStore::add(const BinaryContent& content) {
   const PlaceId id = size_.load(std::memory_order_relaxed);

@@ -39,7 +39,7 @@ class PlaceStore {
  public:
   /// The contents in memory.
   PlaceStore();
-  /// The contents in `file`, the rest in memory.
+  /// The contents in `file` unless it is null, the rest in memory.
   explicit PlaceStore(std::unique_ptr<ScratchFile> file);
 
   /// Amortised constant time; a new chunk is taken every 65,536 places. Throws as MappedMemory and
@@ -103,10 +103,10 @@ class PlaceStore {
   void take_chunk(std::size_t number);
   void extend_stretches(std::size_t place, const BinaryContent& content, std::uint16_t count);
 
-  std::unique_ptr<ScratchFile> file_;  ///< of the contents, if any
-  std::vector<MappedMemory> memory_;   ///< of all chunks; for the writer only
-  std::unique_ptr<Chunk[]> chunks_;    ///< room for all there can be; of them taken: see size_
   std::array<GrowingStretch, kStretchPlaces.size()> growing_;  ///< for the writer only
+  std::unique_ptr<ScratchFile> file_;                          ///< of the contents, if any
+  std::vector<MappedMemory> memory_;  ///< of all chunks; for the writer only
+  std::unique_ptr<Chunk[]> chunks_;   ///< room for all there can be; size_ tells how many are there
   std::atomic<PlaceId> size_ = 0;
 };
 
