@@ -96,6 +96,23 @@ Neighbours expected_neighbours(const Bytes& descriptors, const Bytes& others) {
   return expected;
 }
 
+/// Counts as blocks have them, or up to the largest a kernel may be given.
+std::vector<std::uint8_t> random_counts(Random& random, std::size_t records, int largest) {
+  std::vector<std::uint8_t> counts(records * kBlockCounts);
+  std::generate(counts.begin(), counts.end(),
+                [&] { return static_cast<std::uint8_t>(random.between(0, largest)); });
+  return counts;
+}
+
+std::vector<std::uint16_t> max_min_sums(const Kernels& kernels,
+                                        const std::vector<std::uint8_t>& queries,
+                                        const std::vector<std::uint8_t>& records) {
+  std::vector<std::uint16_t> largest(records.size() / kBlockCounts, 9999);
+  kernels.max_min_sums(queries.data(), queries.size() / kBlockCounts, records.data(),
+                       largest.size(), largest.data());
+  return largest;
+}
+
 class EveryKernel : public testing::TestWithParam<const Kernels*> {};
 
 TEST_P(EveryKernel, CountsTheOverlapOfOneBit) {
@@ -214,6 +231,42 @@ TEST_P(EveryKernel, ReadsDescriptorsAtAnyByte) {
                          others.data() + kDescriptorSize - shift, 6);
     };
     EXPECT_EQ(found(*GetParam()), found(scalar())) << "from byte " << shift;
+  }
+}
+
+TEST_P(EveryKernel, SumsTheMinimaOfEachPairOfCounts) {
+  for (std::size_t k = 0; k < kBlockCounts; ++k) {
+    std::vector<std::uint8_t> one(kBlockCounts, 0);
+    one[k] = 100;
+    std::vector<std::uint8_t> rising(kBlockCounts);
+    for (std::size_t i = 0; i < kBlockCounts; ++i) rising[i] = static_cast<std::uint8_t>(i);
+    ASSERT_EQ(max_min_sums(*GetParam(), one, rising).front(), std::min<std::size_t>(k, 100));
+    ASSERT_EQ(max_min_sums(*GetParam(), rising, one).front(), std::min<std::size_t>(k, 100));
+  }
+}
+
+TEST_P(EveryKernel, SumsTheLargestCounts) {
+  for (const std::size_t records : {1U, 4U, 5U}) {
+    const std::vector<std::uint8_t> largest(records * kBlockCounts, 127);
+    const std::vector<std::uint16_t> sums(records, 127 * kBlockCounts);
+    EXPECT_EQ(max_min_sums(*GetParam(), largest, largest), sums);
+    EXPECT_EQ(max_min_sums(*GetParam(), {}, largest), std::vector<std::uint16_t>(records, 0));
+    EXPECT_TRUE(max_min_sums(*GetParam(), largest, {}).empty());
+  }
+}
+
+TEST_P(EveryKernel, SumsOfMinimaEqualTheScalarOnes) {
+  Random random;
+  for (const int largest : {3, 32, 127}) {
+    for (const std::size_t num_queries : {1U, 2U, 3U, 4U, 5U, 9U, 65U}) {
+      for (const std::size_t num_records : {1U, 2U, 3U, 4U, 5U, 16U, 33U}) {
+        const auto queries = random_counts(random, num_queries, largest);
+        const auto records = random_counts(random, num_records, largest);
+        ASSERT_EQ(max_min_sums(*GetParam(), queries, records),
+                  max_min_sums(scalar(), queries, records))
+            << num_queries << " queries, " << num_records << " records, up to " << largest;
+      }
+    }
   }
 }
 

@@ -3,18 +3,17 @@
 #include "loopbit/place_index.hpp"
 
 #include <algorithm>
-#include <cstdlib>
+#include <filesystem>
 #include <stdexcept>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "full_scan.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
 namespace {
-
-using Contents = std::vector<BinaryContent>;
 
 PlaceIndex index_of(const Contents& contents) {
   PlaceIndex index;
@@ -29,43 +28,6 @@ BinaryContent first_bits(int bits) {
     content.rows[static_cast<std::size_t>(i / 64)] |= std::uint64_t{1} << (i % 64);
   }
   return content;
-}
-
-int overlap(const BinaryContent& a, const BinaryContent& b) {
-  BinaryContent both;
-  for (std::size_t y = 0; y < both.rows.size(); ++y) both.rows[y] = a.rows[y] & b.rows[y];
-  return count(both);
-}
-
-double shifted_similarity(const BinaryContent& query, const BinaryContent& place, int tolerance) {
-  int best = 0;
-  for (int columns = -tolerance; columns <= tolerance; ++columns) {
-    best = std::max(best, overlap(shift_columns(query, columns), place));
-  }
-  return best == 0 ? 0.0 : static_cast<double>(best) / std::max(count(query), count(place));
-}
-
-/// The rule as the header says it, without any shortcut: take the best place that is left and may
-/// be taken, again and again.
-std::vector<Candidate> full_scan(const Contents& places, const BinaryContent& query, PlaceId end,
-                                 const RetrievalOptions& options) {
-  std::vector<Candidate> left;
-  for (PlaceId i = 0; i < end; ++i) {
-    const double xi = shifted_similarity(query, places[static_cast<std::size_t>(i)],
-                                         options.shift_tolerance_columns);
-    if (xi > 0 && xi >= options.min_similarity) left.push_back({i, xi});
-  }
-  std::vector<Candidate> taken;
-  while (!left.empty() && taken.size() < static_cast<std::size_t>(options.max_candidates)) {
-    const Candidate best = *std::max_element(
-        left.begin(), left.end(),
-        [](const Candidate& a, const Candidate& b) { return a.similarity < b.similarity; });
-    taken.push_back(best);
-    std::erase_if(left, [&](const Candidate& other) {
-      return std::abs(other.place - best.place) < options.min_spacing;
-    });
-  }
-  return taken;
 }
 
 std::vector<RetrievalOptions> many_options() {
@@ -92,28 +54,6 @@ void expect_as_full_scan(const Contents& places, const Contents& queries) {
       }
     }
   }
-}
-
-Contents random_contents(Random& random, int num_contents) {
-  Contents contents;
-  for (int i = 0; i < num_contents; ++i) {
-    contents.push_back(random_content(random, 0.05 + 0.4 * random.uniform()));
-  }
-  return contents;
-}
-
-/// A camera's way: each content is the one before with some bits changed, now and then shifted.
-Contents coherent_contents(Random& random, int num_contents) {
-  Contents contents{random_content(random, 0.2)};
-  while (contents.size() < static_cast<std::size_t>(num_contents)) {
-    BinaryContent next = shift_columns(contents.back(), random.between(-1, 1));
-    for (int change = 0; change < 40; ++change) {
-      next.rows[static_cast<std::size_t>(random.between(0, 63))] ^= std::uint64_t{1}
-                                                                    << random.between(0, 63);
-    }
-    contents.push_back(next);
-  }
-  return contents;
 }
 
 TEST(PlaceIndex, AnswersAsAFullScanOfRandomPlaces) {
@@ -207,6 +147,76 @@ TEST(PlaceIndex, ToleratesShiftsUpToTheOption) {
     const auto without = index.query(query, 1, {.shift_tolerance_columns = 3});
     EXPECT_TRUE(without.empty() || without.front().similarity < 0.5);
   }
+}
+
+TEST(PlaceIndex, LimitsTheDifferenceOfCounts) {
+  const PlaceIndex index = index_of({first_bits(90), first_bits(89), first_bits(111)});
+  const RetrievalOptions options{.min_spacing = 1, .max_count_difference = 10};
+  EXPECT_EQ(index.query(first_bits(100), 3, options), (std::vector<Candidate>{{0, 0.9}}));
+}
+
+TEST(PlaceIndex, LimitsTheDistanceOfCenters) {
+  BinaryContent query;
+  query.rows[10] = 0xFF;
+  BinaryContent lower = query;
+  lower.rows[14] = 0xFF;  // its centre is 2 px below
+  const PlaceIndex index = index_of({lower});
+  EXPECT_EQ(index.query(query, 1, {.max_center_distance_px = 2.0}).size(), 1U);
+  EXPECT_EQ(index.query(query, 1, {.max_center_distance_px = 1.999}).size(), 0U);
+}
+
+TEST(PlaceIndex, PlacesBeyondTheLimitsKeepNobodyOut) {
+  const PlaceIndex index = index_of({first_bits(100), first_bits(80)});
+  // The first is no candidate, for its count, and so its neighbour may be one.
+  const BinaryContent query = first_bits(80);
+  const RetrievalOptions options{.min_spacing = 2, .max_count_difference = 10};
+  EXPECT_EQ(index.query(query, 2, options), (std::vector<Candidate>{{1, 1.0}}));
+}
+
+TEST(PlaceIndex, ContentsNeverMove) {
+  PlaceIndex index = index_of({first_bits(1)});
+  const BinaryContent* first = &index.content(0);
+  for (int i = 0; i < 70'000; ++i) index.add(first_bits(2));
+  EXPECT_EQ(&index.content(0), first);
+  EXPECT_EQ(*first, first_bits(1));
+  EXPECT_EQ(index.content(70'000), first_bits(2));
+}
+
+class PlaceIndexOnDisk : public ScratchTest {};
+
+TEST_F(PlaceIndexOnDisk, AnswersAsTheOneInMemory) {
+  Random random;
+  const Contents places = coherent_contents(random, 2'000);
+  PlaceIndex on_disk(path(""));
+  for (const BinaryContent& content : places) on_disk.add(content);
+  const PlaceIndex in_memory = index_of(places);
+  for (const std::size_t query : {0U, 700U, 1999U}) {
+    EXPECT_EQ(on_disk.query(places[query], 2'000), in_memory.query(places[query], 2'000));
+    EXPECT_EQ(on_disk.content(static_cast<PlaceId>(query)), places[query]);
+  }
+}
+
+TEST_F(PlaceIndexOnDisk, LeavesNothingBehind) {
+  PlaceIndex index(path(""));
+  index.add(first_bits(1));
+  EXPECT_TRUE(std::filesystem::is_empty(path("")));
+}
+
+TEST_F(PlaceIndexOnDisk, SaysWhereItCannotWrite) {
+  expect_error(ErrorKind::output, {path("missing")}, [&] { PlaceIndex index(path("missing")); });
+}
+
+TEST(PlaceIndex, TellsWhatItLookedAt) {
+  Random random;
+  const PlaceIndex index = index_of(coherent_contents(random, 1'030));
+  RetrievalWork work;
+  static_cast<void>(index.query(index.content(100), 1'030, {.max_candidates = 1}, &work));
+  EXPECT_EQ(work.stretches[0], 2);
+  EXPECT_GT(work.contents, 0);
+  EXPECT_LT(work.contents, 300);
+  static_cast<void>(index.query(BinaryContent{}, 1'030, {}, &work));
+  EXPECT_EQ(work.stretches[0], 0);
+  EXPECT_EQ(work.contents, 0);
 }
 
 TEST(PlaceIndex, MinSimilarityItselfIsEnough) {

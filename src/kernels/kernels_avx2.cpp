@@ -154,9 +154,74 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   }
 }
 
+struct Counts {
+  __m256i parts[4];
+};
+
+Counts load_counts(const std::uint8_t* counts) {
+  return {{load(counts), load(counts + 32), load(counts + 64), load(counts + 96)}};
+}
+
+/// The sum of the minima, in four parts.
+__m256i min_sum_lanes(const Counts& a, const Counts& b) {
+  const auto minimum = [&](int part) { return _mm256_min_epu8(a.parts[part], b.parts[part]); };
+  const __m256i low = _mm256_add_epi8(minimum(0), minimum(1));
+  const __m256i high = _mm256_add_epi8(minimum(2), minimum(3));
+  const __m256i zero = _mm256_setzero_si256();
+  return _mm256_add_epi64(_mm256_sad_epu8(low, zero), _mm256_sad_epu8(high, zero));
+}
+
+/// The sums with four records that follow each other, in the low four of the 16-bit lanes: side by
+/// side, one reduction serves them all.
+__m128i min_sums_with_four(const Counts& a, const std::uint8_t* records) {
+  const auto lanes = [&](std::size_t i) {
+    return min_sum_lanes(a, load_counts(records + i * kBlockCounts));
+  };
+  const __m256i low = _mm256_or_si256(lanes(0), _mm256_slli_epi64(lanes(1), 16));
+  const __m256i high =
+      _mm256_or_si256(_mm256_slli_epi64(lanes(2), 32), _mm256_slli_epi64(lanes(3), 48));
+  const __m256i all = _mm256_or_si256(low, high);
+  const __m128i sum = _mm_add_epi16(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1));
+  return _mm_add_epi16(sum, _mm_unpackhi_epi64(sum, _mm_setzero_si128()));
+}
+
+/// The largest sum of several queries with one record, four queries at a time.
+std::uint16_t max_min_sum(const std::uint8_t* queries, std::size_t num_queries,
+                          const std::uint8_t* record) {
+  const Counts counts = load_counts(record);
+  __m128i best = _mm_setzero_si128();
+  std::size_t q = 0;
+  for (; q + 4 <= num_queries; q += 4) {
+    best = _mm_max_epu16(best, min_sums_with_four(counts, queries + q * kBlockCounts));
+  }
+  for (; q < num_queries; ++q) {
+    const __m256i lanes = min_sum_lanes(counts, load_counts(queries + q * kBlockCounts));
+    best = _mm_max_epu16(best, _mm_cvtsi32_si128(sum_lanes_epi64(lanes)));
+  }
+  best = _mm_max_epu16(best, _mm_srli_epi64(best, 32));
+  best = _mm_max_epu16(best, _mm_srli_epi64(best, 16));
+  return static_cast<std::uint16_t>(_mm_extract_epi16(best, 0));
+}
+
+void max_min_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* records,
+                  std::size_t num_records, std::uint16_t* largest) {
+  std::size_t i = 0;
+  for (; i + 4 <= num_records; i += 4) {
+    __m128i best = _mm_setzero_si128();
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      const Counts query = load_counts(queries + q * kBlockCounts);
+      best = _mm_max_epu16(best, min_sums_with_four(query, records + i * kBlockCounts));
+    }
+    _mm_storel_epi64(reinterpret_cast<__m128i*>(largest + i), best);
+  }
+  for (; i < num_records; ++i) {
+    largest[i] = max_min_sum(queries, num_queries, records + i * kBlockCounts);
+  }
+}
+
 }  // namespace
 
-const Kernels kAvx2Kernels{"avx2",       max_overlaps<overlap>, describe_constants, nearest_two,
+const Kernels kAvx2Kernels{"avx2",       max_overlaps<overlap>, max_min_sums, describe_constants, nearest_two,
                            integral_row, hessian_row,           maxima_row,         cell_means,
                            describe};
 

@@ -53,9 +53,27 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   }
 }
 
+unsigned min_sum(const std::uint8_t* a, const std::uint8_t* b) {
+  unsigned sum = 0;
+  for (std::size_t k = 0; k < kBlockCounts; ++k) sum += a[k] < b[k] ? a[k] : b[k];
+  return sum;
+}
+
+void max_min_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* records,
+                  std::size_t num_records, std::uint16_t* largest) {
+  for (std::size_t i = 0; i < num_records; ++i) {
+    unsigned best = 0;
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      const unsigned sum = min_sum(queries + q * kBlockCounts, records + i * kBlockCounts);
+      best = sum > best ? sum : best;
+    }
+    largest[i] = static_cast<std::uint16_t>(best);
+  }
+}
+
 }  // namespace
 
-const Kernels kScalarKernels{"scalar",     max_overlaps<overlap>, describe_constants, nearest_two,
+const Kernels kScalarKernels{"scalar",     max_overlaps<overlap>, max_min_sums, describe_constants, nearest_two,
                              integral_row, hessian_row,           maxima_row,         cell_means,
                              describe};
 

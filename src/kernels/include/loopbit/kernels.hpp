@@ -11,6 +11,8 @@ namespace loopbit {
 
 /// 64-bit words in one binary content.
 inline constexpr std::size_t kContentWords = 64;
+/// 8-bit counts in one record of block counts.
+inline constexpr std::size_t kBlockCounts = 128;
 /// 8-bit values in one descriptor.
 inline constexpr std::size_t kDescriptorSize = 64;
 
@@ -63,6 +65,13 @@ struct Kernels {
   void (*max_overlaps)(const std::uint64_t* queries, std::size_t num_queries,
                        const std::uint64_t* places, std::size_t num_places,
                        std::uint16_t* overlaps);
+
+  /// largest[i] = max over q of the sum over k of min(queries[q][k], records[i][k]), each of the
+  /// queries and of the records 128 counts in [0, 127].
+  /// Cost: num_queries * num_records * 128 bytes of minimum and sum.
+  void (*max_min_sums)(const std::uint8_t* queries, std::size_t num_queries,
+                       const std::uint8_t* records, std::size_t num_records,
+                       std::uint16_t* largest);
 
   /// constants[i] = what this variant's nearest_two has to know of the i-th descriptor.
   void (*describe_constants)(const std::int8_t* descriptors, std::size_t num_descriptors,

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
+#include <array>
 #include <cstdint>
+#include <memory>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -23,11 +25,16 @@ struct Candidate {
   bool operator==(const Candidate&) const = default;
 };
 
+/// No two centres M of contents are farther apart, px.
+inline constexpr double kMaxCenterDistance_px = 90.0;
+
 struct RetrievalOptions {
   int max_candidates = 20;
   double min_similarity = 0.2;
   int shift_tolerance_columns = 4;
   int min_spacing = 3;
+  int max_count_difference = 4096;
+  double max_center_distance_px = kMaxCenterDistance_px;
 
   static constexpr auto fields() {
     using S = RetrievalOptions;
@@ -38,33 +45,66 @@ struct RetrievalOptions {
         Field{"shift_tolerance_columns", &S::shift_tolerance_columns, 0, 32,
               "the contents are compared shifted sideways by up to so many of their 64 columns"},
         Field{"min_spacing", &S::min_spacing, 1, 1000,
-              "candidates are at least so many places apart"}};
+              "candidates are at least so many places apart"},
+        Field{"max_count_difference", &S::max_count_difference, 0, 4096,
+              "a candidate's |O| differs from the query's by at most so many pixels; 4096 = any"},
+        Field{"max_center_distance_px", &S::max_center_distance_px, 0.0, kMaxCenterDistance_px,
+              "a candidate's centre M lies within so many pixels of the query's; 90 = anywhere"}};
   }
 };
 
+/// What one query looked at.
+struct RetrievalWork {
+  /// Stretches of 512, 32, 8 and 2 consecutive places whose bounds were computed.
+  std::array<std::int64_t, 4> stretches{};
+  std::int64_t contents = 0;  ///< places whose contents were compared
+};
+
+class PlaceStore;
+
 /// The binary contents of all places, and the question which of them look like a query.
-/// Not thread-safe while adding; any number of threads may query at once.
+///
+/// One thread may add while any number of others ask: a query sees the places that were there when
+/// it began, and contents never move. Memory: 600 bytes a place, 512 of them its content.
 class PlaceIndex {
  public:
-  /// Adds a place and returns its number. Amortised constant time; 516 bytes a place.
+  /// All in memory.
+  PlaceIndex();
+  /// The contents in a file without a name in `scratch_folder`, mapped to memory, which holds what
+  /// the bounds need, 88 bytes a place. The file is gone when the index is. Throws Error (kind
+  /// output) if it cannot be made.
+  explicit PlaceIndex(const std::string& scratch_folder);
+  ~PlaceIndex();
+  PlaceIndex(const PlaceIndex&) = delete;
+  PlaceIndex& operator=(const PlaceIndex&) = delete;
+  /// An index moved from may only be assigned to or destroyed.
+  PlaceIndex(PlaceIndex&&) noexcept;
+  PlaceIndex& operator=(PlaceIndex&&) noexcept;
+
+  /// Adds a place and returns its number. Amortised constant time; see add_p99_us of
+  /// bench_retrieval. Throws Error (kind output), and stays as it was, if the disk that holds the
+  /// contents is full.
   PlaceId add(const BinaryContent& content);
 
-  [[nodiscard]] PlaceId size() const { return static_cast<PlaceId>(contents_.size()); }
+  [[nodiscard]] PlaceId size() const;
 
-  /// Throws std::out_of_range unless 0 <= place < size().
+  /// Valid as long as the index. Throws std::out_of_range unless 0 <= place < size().
   [[nodiscard]] const BinaryContent& content(PlaceId place) const;
 
   /// The most similar places among those numbered below `end`, best first; of equals, the earlier
   /// place first. Similarity is xi (Wang et al. 2019, section III-B), the best over all shifts of
   /// the query within the tolerance; |O1| and |O2| are counted before shifting. Going down that
-  /// order, a place is passed over if it lies closer than `min_spacing` to one already taken.
-  /// Exact: an empty content has no candidates and is none. Cost: linear in `end`.
+  /// order, a place is passed over if it lies closer than `min_spacing` to one already taken, or
+  /// beyond the limits of count and centre.
+  /// Exact, as a full scan would answer: an empty content has no candidates and is none. Cost:
+  /// bounds of stretches of the past, and a look at the places that these leave; see
+  /// docs/retrieval.md. `work`, if not null, is told what was looked at.
   [[nodiscard]] std::vector<Candidate> query(const BinaryContent& content, PlaceId end,
-                                             const RetrievalOptions& options = {}) const;
+                                             const RetrievalOptions& options = {},
+                                             RetrievalWork* work = nullptr) const;
 
  private:
-  std::vector<BinaryContent> contents_;
-  std::vector<int> counts_;  ///< counts_[i] = count(contents_[i])
+  std::unique_ptr<PlaceStore> store_;
 };
 
 }  // namespace loopbit

@@ -1,0 +1,68 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "place_store.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+namespace loopbit {
+namespace {
+
+/// From this chunk on a map is so large that the last, half-empty large page hardly counts.
+constexpr std::size_t kFirstChunkOfLargePages = 4;
+
+}  // namespace
+
+PlaceStore::PlaceStore() : PlaceStore(nullptr) {}
+
+// The table of chunks is not touched before it is needed: new memory of that size costs nothing.
+PlaceStore::PlaceStore(std::unique_ptr<ScratchFile> file)
+    : file_(std::move(file)), chunks_(std::make_unique_for_overwrite<Chunk[]>(kMaxChunks)) {}
+
+PlaceId PlaceStore::add(const BinaryContent& content) {
+  const PlaceId id = size_.load(std::memory_order_relaxed);
+  if (id == std::numeric_limits<PlaceId>::max()) {
+    throw std::length_error("a place index holds at most 2,147,483,647 places");
+  }
+  const auto place = static_cast<std::size_t>(id);
+  if (place % kChunkPlaces == 0) take_chunk(place / kChunkPlaces);
+
+  const Chunk& chunk = chunks_[place / kChunkPlaces];
+  const auto set = static_cast<std::uint16_t>(loopbit::count(content));
+  chunk.contents[place % kChunkPlaces] = content;
+  chunk.bounds->counts[place % kChunkPlaces] = set;
+  extend_stretches(place, content, set);
+  size_.store(id + 1, std::memory_order_release);
+  return id;
+}
+
+void PlaceStore::take_chunk(std::size_t number) {
+  constexpr std::size_t kContentsBytes = kChunkPlaces * sizeof(BinaryContent);
+  memory_.reserve(memory_.size() + 2);
+  MappedMemory contents = file_ ? file_->extend(kContentsBytes) : MappedMemory(kContentsBytes);
+  MappedMemory bounds(sizeof(Bounds));
+  if (number >= kFirstChunkOfLargePages) bounds.prefer_large_pages();
+  chunks_[number] = {static_cast<BinaryContent*>(contents.data()),
+                     static_cast<Bounds*>(bounds.data())};
+  memory_.push_back(std::move(contents));
+  memory_.push_back(std::move(bounds));
+}
+
+void PlaceStore::extend_stretches(std::size_t place, const BinaryContent& content,
+                                  std::uint16_t count) {
+  GrowingStretch finer{block_counts(content), count};
+  for (std::size_t level = kFinestLevel + 1; level-- > 0;) {
+    GrowingStretch& growing = growing_[level];
+    raise(growing.maxima, finer.maxima);
+    growing.smallest_count = std::min(growing.smallest_count, finer.smallest_count);
+    if ((place + 1) % kStretchPlaces[level] != 0) return;
+    const Position at = position(level, place / kStretchPlaces[level]);
+    at.bounds->maxima[at.record] = growing.maxima;
+    at.bounds->smallest_counts[at.record] = growing.smallest_count;
+    finer = std::exchange(growing, GrowingStretch{});
+  }
+}
+
+}  // namespace loopbit

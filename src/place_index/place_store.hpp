@@ -1,0 +1,113 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "loopbit/binary_content.hpp"
+#include "loopbit/place_index.hpp"
+
+#include "block_counts.hpp"
+#include "mapped_memory.hpp"
+
+namespace loopbit {
+
+/// Consecutive places bounded together, coarse to fine. Neighbours in time look alike, so that the
+/// maximum over a stretch is little more than any of its places.
+inline constexpr std::array<std::size_t, 4> kStretchBits{9, 5, 3, 1};
+inline constexpr std::array<std::size_t, 4> kStretchPlaces{512, 32, 8, 2};
+inline constexpr std::size_t kFinestLevel = kStretchPlaces.size() - 1;
+
+struct StretchBounds {
+  const BlockCounts* maxima;             ///< the largest block counts among its places
+  const std::uint16_t* smallest_counts;  ///< the smallest |O| among them
+};
+
+/// The contents of all places, their counts, and bounds for stretches of them. Stretch i of a level
+/// with n places a stretch holds the places i * n to (i + 1) * n - 1.
+///
+/// One thread may add while any number of others read what lies below a size() they have seen:
+/// memory is in chunks that never move, and all about a place, and about a stretch that ends with
+/// it, is written before size() tells of it, and never again.
+class PlaceStore {
+ public:
+  /// The contents in memory.
+  PlaceStore();
+  /// The contents in `file` unless it is null, the rest in memory.
+  explicit PlaceStore(std::unique_ptr<ScratchFile> file);
+
+  /// Amortised constant time; a new chunk is taken every 65,536 places. Throws as MappedMemory and
+  /// ScratchFile do, and stays as it was.
+  PlaceId add(const BinaryContent& content);
+
+  [[nodiscard]] PlaceId size() const { return size_.load(std::memory_order_acquire); }
+
+  // Below: 0 <= place < size(), and stretches all of whose places are below size().
+
+  /// The contents of places of one chunk follow each other.
+  [[nodiscard]] const BinaryContent& content(std::size_t place) const {
+    return chunks_[place / kChunkPlaces].contents[place % kChunkPlaces];
+  }
+  [[nodiscard]] int count(std::size_t place) const {
+    return chunks_[place / kChunkPlaces].bounds->counts[place % kChunkPlaces];
+  }
+  /// The bounds of a stretch, and, up to the end of the chunk, of those after it.
+  [[nodiscard]] StretchBounds bounds(std::size_t level, std::size_t stretch) const {
+    const Position at = position(level, stretch);
+    return {&at.bounds->maxima[at.record], &at.bounds->smallest_counts[at.record]};
+  }
+
+ private:
+  static constexpr std::size_t kChunkBits = 16;
+  static constexpr std::size_t kChunkPlaces = std::size_t{1} << kChunkBits;
+  static constexpr std::size_t kMaxChunks = (std::size_t{1} << 31U) / kChunkPlaces;
+
+  /// Where the records of each level begin in a chunk, and, last, how many there are.
+  static constexpr auto kFirstRecord = [] {
+    std::array<std::size_t, kStretchPlaces.size() + 1> first{};
+    for (std::size_t level = 0; level < kStretchPlaces.size(); ++level) {
+      first[level + 1] = first[level] + kChunkPlaces / kStretchPlaces[level];
+    }
+    return first;
+  }();
+
+  struct Bounds {
+    std::array<BlockCounts, kFirstRecord.back()> maxima;
+    std::array<std::uint16_t, kFirstRecord.back()> smallest_counts;
+    std::array<std::uint16_t, kChunkPlaces> counts;
+  };
+  struct Chunk {
+    BinaryContent* contents;
+    Bounds* bounds;
+  };
+  struct Position {
+    Bounds* bounds;
+    std::size_t record;
+  };
+  struct GrowingStretch {
+    BlockCounts maxima;
+    std::uint16_t smallest_count = UINT16_MAX;
+  };
+
+  [[nodiscard]] Position position(std::size_t level, std::size_t stretch) const {
+    const std::size_t bits = kChunkBits - kStretchBits[level];
+    const std::size_t in_chunk = stretch & ((std::size_t{1} << bits) - 1);
+    return {chunks_[stretch >> bits].bounds, kFirstRecord[level] + in_chunk};
+  }
+  void take_chunk(std::size_t number);
+  void extend_stretches(std::size_t place, const BinaryContent& content, std::uint16_t count);
+
+  std::array<GrowingStretch, kStretchPlaces.size()> growing_;  ///< for the writer only
+  std::unique_ptr<ScratchFile> file_;                          ///< of the contents, if any
+  std::vector<MappedMemory> memory_;  ///< of all chunks; for the writer only
+  std::unique_ptr<Chunk[]> chunks_;   ///< room for all there can be; size_ tells how many are there
+  std::atomic<PlaceId> size_ = 0;
+};
+
+}  // namespace loopbit

@@ -1,0 +1,177 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+// The search with bounds against a naive full scan, on maps of many stretches, with each kernel.
+#include "pruned_search.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "loopbit/binary_content.hpp"
+
+#include "full_scan.hpp"
+#include "test_support.hpp"
+
+namespace loopbit::test {
+namespace {
+
+void add_all(PlaceStore& store, const Contents& contents) {
+  for (const BinaryContent& content : contents) store.add(content);
+}
+
+/// Settings that differ in all that the bounds and the floor depend on.
+std::vector<RetrievalOptions> some_options() {
+  return {
+      {},
+      {.max_candidates = 1, .min_similarity = 0.0, .shift_tolerance_columns = 0},
+      {.max_candidates = 1000, .min_similarity = 0.0, .min_spacing = 1},
+      {.max_candidates = 1000, .min_similarity = 0.4, .shift_tolerance_columns = 1},
+      {.max_candidates = 5, .shift_tolerance_columns = 32, .min_spacing = 40},
+      {.max_candidates = 3, .min_similarity = 0.0, .min_spacing = 1000},
+      {.max_candidates = 7, .shift_tolerance_columns = 2, .max_count_difference = 60},
+      {.min_similarity = 0.0, .max_center_distance_px = 0.8},
+  };
+}
+
+class PrunedSearchTest : public testing::TestWithParam<const Kernels*> {
+ protected:
+  static void expect_as_full_scan(const Contents& places, const Contents& queries) {
+    PlaceStore store;
+    add_all(store, places);
+    const PlaceId size = store.size();
+    for (const BinaryContent& query : queries) {
+      PlaceId end = size;
+      for (const RetrievalOptions& options : some_options()) {
+        PrunedSearch search(store, end, query, options, *GetParam());
+        ASSERT_EQ(search.run(), full_scan(places, query, end, options))
+            << "shift " << options.shift_tolerance_columns << ", spacing " << options.min_spacing
+            << ", most " << options.max_candidates << ", end " << end << " of " << size;
+        end -= size / 37;  // ends anywhere within stretches of all lengths
+      }
+    }
+  }
+};
+
+TEST_P(PrunedSearchTest, OfRandomPlaces) {
+  Random random;
+  const Contents places = random_contents(random, 1'300);
+  expect_as_full_scan(places,
+                      {places[800], shift_columns(places[30], 3), random_content(random, 0.3)});
+}
+
+TEST_P(PrunedSearchTest, OfACoherentSequence) {
+  Random random;
+  Contents places = coherent_contents(random, 1'400);
+  const Contents again(places.begin() + 100, places.begin() + 400);  // a second lap
+  places.insert(places.end(), again.begin(), again.end());
+  expect_as_full_scan(places, {places[0], places[333], shift_columns(places[700], -2),
+                               random_content(random, 0.2)});
+}
+
+TEST_P(PrunedSearchTest, OfEqualPlaces) {
+  Random random;
+  const BinaryContent content = random_content(random, 0.3);
+  expect_as_full_scan(Contents(1'100, content), {content, random_content(random, 0.3)});
+}
+
+TEST_P(PrunedSearchTest, OfEmptyAndFullPlaces) {
+  Random random;
+  Contents places(600, full_content());
+  places.resize(1'200);  // empty ones
+  places.push_back(random_content(random, 0.5));
+  places.resize(1'300, full_content());
+  BinaryContent one_bit;
+  one_bit.rows[20] = 16;
+  expect_as_full_scan(places, {full_content(), random_content(random, 0.5), one_bit});
+}
+
+TEST_P(PrunedSearchTest, OfAlternatingPlaces) {
+  Random random;
+  const Contents two = random_contents(random, 2);
+  Contents places;
+  places.reserve(1'100);
+  for (std::size_t i = 0; i < 1'100; ++i) places.push_back(two[i % 3 == 0 ? 0 : 1]);
+  expect_as_full_scan(places, two);
+}
+
+/// A drive, a tour and a part of the drive again, slightly shifted.
+Contents real_contents() {
+  Contents contents;
+  contents.reserve(900);
+  for (std::size_t i = 0; i < 300; ++i) {
+    contents.push_back(binary_content(real_image("kitti03/images", i)));
+  }
+  for (std::size_t i = 0; i < 300; ++i) {
+    contents.push_back(binary_content(real_image("office_tour/images", i)));
+  }
+  for (std::size_t i = 0; i < 300; ++i) contents.push_back(shift_columns(contents[i], 1));
+  return contents;
+}
+
+TEST_P(PrunedSearchTest, OfRealContents) {
+  LOOPBIT_NEEDS_DATA("kitti03");
+  LOOPBIT_NEEDS_DATA("office_tour");
+  static const Contents contents = real_contents();
+  expect_as_full_scan(contents, {contents[50], shift_columns(contents[500], 4),
+                                 binary_content(real_image("kitti03/images", 350))});
+}
+
+TEST_P(PrunedSearchTest, AcrossChunksOfMemory) {
+  Random random;
+  const Contents places = coherent_contents(random, 66'200);
+  PlaceStore store;
+  add_all(store, places);
+  for (const std::size_t query : {65'530U, 66'100U}) {
+    PrunedSearch search(store, store.size(), places[query], {}, *GetParam());
+    ASSERT_EQ(search.run(), full_scan(places, places[query], store.size(), {}));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kernels, PrunedSearchTest,
+                         testing::ValuesIn(available_kernels().begin(), available_kernels().end()),
+                         [](const auto& kernels) { return std::string(kernels.param->name); });
+
+TEST(FoundPlaces, LeaveRoomForAPlaceThatKeepsSeveralOut) {
+  FoundPlaces found({.max_candidates = 2, .min_similarity = 0.0, .min_spacing = 3});
+  found.add({0, 0.8});
+  found.add({3, 0.7});
+  // These two are far enough apart for the answer, but a better one may yet keep both out.
+  EXPECT_TRUE(found.may_matter(0.6, 10));
+  found.add({2, 0.9});
+  found.add({10, 0.6});
+  EXPECT_EQ(std::move(found).answer(), (std::vector<Candidate>{{2, 0.9}, {10, 0.6}}));
+}
+
+TEST(FoundPlaces, LeaveOutWhatNoOrderOfThePlacesCanBring) {
+  FoundPlaces found({.max_candidates = 2, .min_similarity = 0.0, .min_spacing = 3});
+  found.add({0, 0.8});
+  found.add({5, 0.7});
+  EXPECT_FALSE(found.may_matter(0.699, 0));
+  EXPECT_TRUE(found.may_matter(0.7, 4));
+  EXPECT_FALSE(found.may_matter(0.7, 6));  // of equals, the earlier is in the answer
+  EXPECT_TRUE(found.may_matter(0.701, 1'000));
+}
+
+TEST(BlockCounts, BoundTheOverlap) {
+  Random random;
+  for (int i = 0; i < 200; ++i) {
+    const BinaryContent a = random_content(random, random.uniform());
+    const BinaryContent b = random_content(random, random.uniform());
+    const BlockCounts of_a = block_counts(a);
+    const BlockCounts of_b = block_counts(b);
+    int sum = 0;
+    int bound = 0;
+    for (std::size_t k = 0; k < of_a.of.size(); ++k) {
+      sum += of_a.of[k];
+      bound += std::min(of_a.of[k], of_b.of[k]);
+    }
+    EXPECT_EQ(sum, count(a));
+    EXPECT_GE(bound, similarity(a, b) * std::max(count(a), count(b)));
+  }
+}
+
+}  // namespace
+}  // namespace loopbit::test
