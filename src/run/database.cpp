@@ -31,7 +31,7 @@ void Database::fail() const {
   if (access_ == Access::create) {
     throw Error(ErrorKind::output,
                 fmt::format("'{}' cannot be written ({}): check the free space and the "
-                            "permissions of its folder.",
+                            "permissions of its folder, or run without it, by --no-report.",
                             path_, reason));
   }
   throw Error(ErrorKind::input,
