@@ -82,13 +82,15 @@ TEST_P(EveryKernel, MaximaAreLargerThanTheirNeighbours) {
       const cv::Rect valid = pyramid.valid_samples(o, i + 1);
       for (int y = valid.y + 1; y < valid.y + valid.height - 1; ++y) {
         for (int x = valid.x + 1; x < valid.x + valid.width - 1; ++x) {
-          float largest = 0;
-          for (int k = 0; k < 27; ++k) {
-            largest = std::max(
-                largest, pyramid.response(o, i + k / 9 - 1, x + k % 3 - 1, y + k / 3 % 3 - 1));
-          }
           const float here = pyramid.response(o, i, x, y);
-          if (here < largest || here <= 1.0F) continue;
+          bool is_maximum = here > 1.0F;
+          for (int k = 0; k < 27 && is_maximum; ++k) {
+            const float other =
+                pyramid.response(o, i + k / 9 - 1, x + k % 3 - 1, y + k / 3 % 3 - 1);
+            // Of equal ones, the first.
+            if (k != 13) is_maximum = k < 13 ? here > other : here >= other;
+          }
+          if (!is_maximum) continue;
           ASSERT_LT(expected, maxima.size());
           const Maximum& m = maxima[expected++];
           EXPECT_EQ(m.response, here);

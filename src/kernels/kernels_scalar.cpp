@@ -73,8 +73,8 @@ void max_min_sums(const std::uint8_t* queries, std::size_t num_queries, const st
 
 }  // namespace
 
-const Kernels kScalarKernels{"scalar",     max_overlaps<overlap>, max_min_sums, describe_constants, nearest_two,
-                             integral_row, hessian_row,           maxima_row,         cell_means,
-                             describe};
+const Kernels kScalarKernels{
+    "scalar",     max_overlaps<overlap>, max_min_sums, describe_constants, nearest_two,
+    integral_row, hessian_row,           maxima_row,   cell_means,         describe};
 
 }  // namespace loopbit

@@ -235,8 +235,8 @@ class LoopDetector::Impl {
     return std::tuple(agreement_.score(v, seen.look.is_step), v.matches, v.candidate.similarity);
   }
 
-  /// Candidates stand apart; the best place of all may be a neighbour of one. Verifies those of an
-  /// acceptable match.
+  /// Candidates stand apart; the best place of all may be a neighbour of one. Verifies those of the
+  /// best candidate.
   [[nodiscard]] VerifiedCandidate refined(VerifiedCandidate best, const Observation& seen,
                                           PlaceId end) const {
     const PlaceId middle = best.candidate.place;
@@ -264,7 +264,8 @@ class LoopDetector::Impl {
         [&](const auto& a, const auto& b) { return rank(a, seen) < rank(b, seen); });
     const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
     const auto accepted = [&] { return score() >= options_.decision.min_score; };
-    if (accepted()) best = refined(best, seen, end);
+    // Below, a neighbour is no likelier to be right than any other place.
+    if (score() > options_.decision.chance_inliers) best = refined(best, seen, end);
     detection.status = accepted() ? Status::loop : reason_of_rejection(best, options_.verification);
     detection.match = best.candidate.place;
     detection.score = score();

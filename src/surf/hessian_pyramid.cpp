@@ -17,8 +17,8 @@ constexpr int kPadding = 16;
 
 int round_up(int value, int unit) { return (value + unit - 1) / unit * unit; }
 
-/// In samples. A little more than half, for a peak half-way between two of them.
-constexpr double kMaxOffset = 0.51;
+/// In samples. A little more than half: one axis may push another past it.
+constexpr double kMaxOffset = 0.6;
 
 /// The first x >= `x` that is marked, or one >= `end`. Reads up to 7 bytes past the end.
 int next_marked(const std::uint8_t* marks, int x, int end) {

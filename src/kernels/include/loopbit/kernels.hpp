@@ -56,7 +56,8 @@ struct NearestTwo {
 };
 
 /// The inner loops that decide the speed of loopbit, for one instruction set. All of them return
-/// the same bits; the scalar one is the reference.
+/// the same bits: sums are of integers, or of floats in one fixed order without contraction. The
+/// scalar one is the reference; on Arm the compiler makes NEON code of it.
 struct Kernels {
   std::string_view name;
 
@@ -82,13 +83,26 @@ struct Kernels {
   void (*nearest_two)(const std::int8_t* descriptors, const std::int8_t* others,
                       const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest);
 
+  /// The next row of an integral image. `column_sums`: of all rows before, brought up to date; the
+  /// corners at the row's lower edge, width + 1 of them, go to `even` and `odd`, see IntegralView.
   void (*integral_row)(const std::uint8_t* pixels, std::size_t width, std::uint32_t* column_sums,
                        std::uint32_t* even, std::uint32_t* odd);
+  /// responses[k] = the determinant of the Hessian (Bay et al. 2008, eq. 3) in squared grey levels,
+  /// 0 where negative, at row y and column 2 * (first + k), by box filters with lobes of an odd
+  /// width of 3 to 65 px. count <= kHessianRun. Whole blocks of 16 are written, and corners up to
+  /// 128 past either end of a row are read, though they decide nothing within the image.
   void (*hessian_row)(const IntegralView& integral, std::ptrdiff_t y, std::ptrdiff_t first,
                       std::ptrdiff_t count, std::ptrdiff_t lobe, float* responses);
+  /// is_maximum[k] = 1 where layers[1][k] is above `min_response` and no neighbour in the three
+  /// layers, whose rows are `stride` apart, is larger. Reads 16 past either end of the rows at,
+  /// before and after layers[i], and writes whole blocks of 16.
   void (*maxima_row)(const float* const* layers, std::ptrdiff_t stride, std::ptrdiff_t count,
                      float min_response, std::uint8_t* is_maximum);
+  /// The mean grey level of each cell: kCells rows of kCellStride, the rest padding.
   void (*cell_means)(const CellGrid& grid, float* cells);
+  /// The SURF descriptor (Bay et al. 2008, section 4.2) of such cells: sums of dx, dy, |dx| and
+  /// |dy| over 4 x 4 bins, of unit length, times kDescriptorScale, rounded and cut off at 127. Bin
+  /// (x, y) of kind k is value (4 y + k) * 4 + x. All 0 for cells without contrast.
   void (*describe)(const float* cells, std::int8_t* descriptor);
 };
 

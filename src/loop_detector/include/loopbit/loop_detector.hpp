@@ -21,7 +21,8 @@ namespace loopbit {
 /// them, and agreement with the frames just before decides with them. The same images give the same
 /// answers on any processor. Not thread-safe; use one detector a thread.
 ///
-/// Memory: about 60 KB a place, nearly all of it features.
+/// Memory: at most 50 KB a place by default, nearly all of it features, and working memory of its
+/// own, which it keeps from frame to frame.
 class LoopDetector {
  public:
   /// Throws Error (kind option) if `options` are not valid.

@@ -40,7 +40,7 @@ struct ExclusionOptions {
 
 /// The one rule that accepts a match: score >= min_score.
 struct DecisionOptions {
-  double min_score = 21.0;
+  double min_score = 22.0;
   int agreement_steps = 2;
   double agreement_weight = 0.5;
   int chance_inliers = 8;

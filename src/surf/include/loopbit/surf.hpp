@@ -20,7 +20,7 @@ namespace loopbit {
 struct Keypoint {
   float x_px = 0;
   float y_px = 0;
-  float scale = 0;      ///< 1 = a 9 x 9 box filter, sigma 1.2 px
+  float scale = 0;      ///< sigma in px: a 9 x 9 box filter has 1.2
   float angle_rad = 0;  ///< 0 where features are upright
 };
 
@@ -54,9 +54,12 @@ struct SurfOptions {
   }
 };
 
-/// Extracts features from image after image, and keeps its working memory in between.
+/// Extracts features from image after image of any size. It owns its working memory, about 12 bytes
+/// a working pixel, and keeps it: for images of a size it has seen, nothing is allocated but what
+/// `features` lacks and what OpenCV needs to resize. Not thread-safe; use one a thread.
 class SurfExtractor {
  public:
+  /// Throws Error (kind option) if `options` are not valid.
   explicit SurfExtractor(const SurfOptions& options = {},
                          const Kernels& kernels = active_kernels());
   ~SurfExtractor();
@@ -65,6 +68,7 @@ class SurfExtractor {
   SurfExtractor(SurfExtractor&&) noexcept;
   SurfExtractor& operator=(SurfExtractor&&) noexcept;
 
+  /// See extract_surf. Replaces `features`.
   void extract(const cv::Mat1b& gray, Features& features);
 
  private:
@@ -74,9 +78,10 @@ class SurfExtractor {
 
 /// SURF features of `gray`, 8 bits, at least 32 x 32 pixels.
 ///
-/// Bay, Tuytelaars, Van Gool, "SURF: Speeded Up Robust Features", ECCV 2006. The response threshold
-/// is a thirtieth of the customary one, so that the budget of keypoints decides on most images; dim
-/// or blurred ones have fewer. Deterministic. Cost: see bm_extract_surf.
+/// Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 2008. The budget of keypoints
+/// decides, not a threshold: the strongest are kept, of which a cell of a grid may hold three times
+/// its share, so that dim images keep as many. Only what 8 bits cannot tell from noise is left out.
+/// The same image gives the same bits with every kernel. Cost: see scripts/bench_surf.
 Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options = {});
 
 }  // namespace loopbit

@@ -35,7 +35,8 @@ struct VerificationOptions {
               "a match is kept if its distance is less than this part of the second best"},
         Field{"min_matches", &S::min_matches, 8, 1000, "with fewer matches no geometry is sought"},
         Field{"max_epipolar_error_px", &S::max_epipolar_error_px, 0.1, 50.0,
-              "an inlier lies at most this far from its epipolar line, working pixels"},
+              "an inlier lies at most this far (Sampson's distance) from the geometry, working "
+              "pixels"},
         Field{"min_spacing_scales", &S::min_spacing_scales, 0.0, 100.0,
               "inliers closer than this are one piece of evidence; a descriptor spans 20 scales"}};
   }
@@ -51,8 +52,9 @@ struct Verification {
 /// Mutual best matches by the distance of descriptors that pass the ratio test from either side;
 /// only features with the same sign of the Laplacian are compared. Each feature is in one match at
 /// most: one-way matches gather on few points and fake inliers. Equally near features are ambiguous
-/// and match nothing. A feature that has nothing to be second to is distinct. Cost: half of query
-/// times place features.
+/// and match nothing. A feature that has nothing to be second to is distinct. Cost: half of
+/// query times place features from one side, and the matches found times half the query's back;
+/// no distance is kept.
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio);
 
 /// The largest set of `matches` found that one fundamental matrix explains, by RANSAC with a fixed
