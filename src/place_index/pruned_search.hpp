@@ -63,7 +63,7 @@ class PrunedSearch {
 
   const PlaceStore& store_;
   const Kernels& kernels_;
-  const RetrievalOptions& options_;
+  RetrievalOptions options_;
   std::size_t end_;
   int query_count_;
   cv::Point2d query_center_;
