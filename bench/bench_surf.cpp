@@ -55,6 +55,7 @@ double median(std::vector<double> values) {
 
 double median_ms(int repeats, const std::function<void()>& action) {
   std::vector<double> times;
+  times.reserve(static_cast<std::size_t>(repeats));
   for (int i = 0; i < repeats; ++i) times.push_back(time_ms(action));
   return median(times);
 }
@@ -66,7 +67,7 @@ struct Machine {
 };
 
 Machine measure_machine() {
-  std::vector<char> from(512 * 1024, 1);
+  std::vector<char> from(std::size_t{512} * 1024, 1);
   std::vector<char> to(from.size());
   const double copy_ms = median_ms(99, [&] { std::memcpy(to.data(), from.data(), to.size()); });
   constexpr int kAdditions = 4'000'000;
@@ -110,7 +111,7 @@ void print_parts(const cv::Mat1b& image, const Machine& machine) {
   });
   // 4 new layers at every second pixel, then twice 2 at half the rows: 5.75 quarters of the pixels.
   const double samples = pixels / 4 * 5.75;
-  const double blobs = static_cast<double>(features.keypoints.size());
+  const auto blobs = static_cast<double>(features.keypoints.size());
   fmt::print("Parts at {} x {}, {} keypoints, {} kernels     ms   bound ms   bound by\n",
              image.cols, image.rows, features.keypoints.size(), kernels.name);
   print_part("integral image", integral_ms, pixels / machine.cycles_per_ms,
@@ -189,6 +190,7 @@ double detector_mean_ms(const fs::path& folder) {
   for (int run = 0; run < kRuns; ++run) {
     LoopDetector detector;
     std::vector<double> frames;
+    frames.reserve(images.size());
     for (const cv::Mat& image : images) frames.push_back(time_ms([&] { detector.process(image); }));
     double sum = 0;
     for (const double frame : frames) sum += frame;
@@ -213,7 +215,7 @@ int main(const fs::path& data) {
   std::vector<cv::Mat1b> full;
   std::vector<cv::Mat1b> working;
   const auto drive = read_all(data / "kitti03/images");
-  for (std::size_t i = 0; i < drive.size(); i += 40) full.push_back(drive[i]);
+  for (std::size_t i = 0; i < drive.size(); i += 40) full.emplace_back(drive[i]);
   for (const char* folder : {"euroc_room/images", "corridor_loop/images"}) {
     const auto images = read_all(data / folder);
     for (std::size_t i = 0; i < images.size(); i += 20) {

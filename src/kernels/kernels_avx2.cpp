@@ -4,7 +4,7 @@
 #include <immintrin.h>
 
 #include "kernel_variants.hpp"
-#include "surf_loops.hpp"
+#include "surf_loops.inc"
 
 namespace loopbit {
 namespace {
@@ -109,7 +109,7 @@ void offer_products(const Lanes& lanes, const std::int8_t* others, const std::in
   for (std::size_t i = 0; i < Count; ++i) sums[i] = _mm256_setzero_si256();
   for (std::size_t c = 0; c < kChunks; ++c) {
     for (std::size_t i = 0; i < Count; ++i) {
-      std::int32_t chunk;
+      std::int32_t chunk = 0;
       __builtin_memcpy(&chunk, others + i * kDescriptorSize + 4 * c, sizeof chunk);
       sums[i] = _mm256_add_epi32(
           sums[i], products_of_4(lanes.magnitudes[c], lanes.bytes[c], _mm256_set1_epi32(chunk)));

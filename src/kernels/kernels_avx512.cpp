@@ -5,7 +5,7 @@
 #include <immintrin.h>
 
 #include "kernel_variants.hpp"
-#include "surf_loops.hpp"
+#include "surf_loops.inc"
 
 namespace loopbit {
 namespace {
@@ -50,7 +50,7 @@ __m512i relative_distances(__m512i constant, __m512i low, __m512i high) {
 }
 
 __m512i chunk(const std::int8_t* descriptor, std::size_t number) {
-  std::int32_t bytes;
+  std::int32_t bytes = 0;
   __builtin_memcpy(&bytes, descriptor + 4 * number, sizeof bytes);
   return _mm512_set1_epi32(bytes);
 }

@@ -3,7 +3,7 @@
 #include <bit>
 
 #include "kernel_variants.hpp"
-#include "surf_loops.hpp"
+#include "surf_loops.inc"
 
 namespace loopbit {
 namespace {

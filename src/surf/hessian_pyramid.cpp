@@ -54,7 +54,8 @@ void HessianPyramid::build(const IntegralImage& integral, const Kernels& kernels
     octave.samples = {(size.width - 1) / step + 1, (size.height - 1) / step + 1};
     octave.stride = round_up(octave.samples.width, kPadding) + kPadding;
     for (auto& layer : octave.layers) {
-      layer.resize(static_cast<std::size_t>(octave.stride * octave.samples.height));
+      layer.resize(static_cast<std::size_t>(octave.stride) *
+                   static_cast<std::size_t>(octave.samples.height));
     }
     const int tile = static_cast<int>(kHessianRun) * kRowStep_px / step;
     const int first_new = o == 0 ? 0 : 2;
@@ -76,12 +77,12 @@ void HessianPyramid::compute(const cv::Rect& tile, int octave, int first_interva
     for (int i = first_interval; i < kIntervals; ++i) {
       const int reach = (3 * lobe_px(octave, i) - 1) / 2;
       if (y * step < reach || y * step + reach >= integral_->size_px().height) continue;
-      float* out = of.layers[static_cast<std::size_t>(i)].data() + y * of.stride + tile.x;
+      float* out = of.row(i, y) + tile.x;
       if (part == 1) {
         kernels.hessian_row(integral, y * step, tile.x, count, lobe_px(octave, i), out);
         continue;
       }
-      std::array<float, kHessianRun> responses;
+      std::array<float, kHessianRun> responses{};
       kernels.hessian_row(integral, y * step, tile.x * part, (count - 1) * part + 1,
                           lobe_px(octave, i), responses.data());
       for (int x = 0; x < count; ++x) out[x] = responses[static_cast<std::size_t>(x * part)];
@@ -93,12 +94,10 @@ void HessianPyramid::take_from_below(int octave, int interval) {
   const cv::Rect valid = valid_samples(octave, interval);
   const Octave& below = octaves_[static_cast<std::size_t>(octave - 1)];
   Octave& of = octaves_[static_cast<std::size_t>(octave)];
-  const float* from = below.layers[static_cast<std::size_t>(2 * interval + 1)].data();
-  float* to = of.layers[static_cast<std::size_t>(interval)].data();
   for (int y = valid.y; y < valid.y + valid.height; ++y) {
-    for (int x = valid.x; x < valid.x + valid.width; ++x) {
-      to[y * of.stride + x] = from[2 * y * below.stride + 2 * x];
-    }
+    const float* from = below.row(2 * interval + 1, 2 * y);
+    float* to = of.row(interval, y);
+    for (int x = valid.x; x < valid.x + valid.width; ++x) to[x] = from[std::ptrdiff_t{2} * x];
   }
 }
 
@@ -113,27 +112,33 @@ bool HessianPyramid::equals_earlier_neighbour(int octave, int interval, int x, i
   return false;
 }
 
+/// Those of a row that is_maximum_ marks and whose 26 neighbours are all valid: the layer above has
+/// the widest filter.
+void HessianPyramid::append_marked(int octave, int interval, int y,
+                                   std::vector<Maximum>& maxima) const {
+  const cv::Rect valid = valid_samples(octave, interval + 1);
+  const int end = valid.x + valid.width - 1;
+  for (int x = next_marked(is_maximum_.data(), valid.x + 1, end); x < end;
+       x = next_marked(is_maximum_.data(), x + 1, end)) {
+    if (equals_earlier_neighbour(octave, interval, x, y)) continue;
+    maxima.push_back({response(octave, interval, x, y), static_cast<std::uint16_t>(x),
+                      static_cast<std::uint16_t>(y), static_cast<std::uint8_t>(octave),
+                      static_cast<std::uint8_t>(interval)});
+  }
+}
+
 void HessianPyramid::find_maxima(float min_response, const Kernels& kernels,
                                  std::vector<Maximum>& maxima) {
   for (int o = 0; o < kOctaves; ++o) {
     const Octave& octave = octaves_[static_cast<std::size_t>(o)];
     is_maximum_.resize(static_cast<std::size_t>(octave.stride));
     for (int i = 1; i + 1 < kIntervals; ++i) {
-      // All 26 neighbours must be valid, and the layer above has the widest filter.
       const cv::Rect valid = valid_samples(o, i + 1);
-      const int first = valid.x + 1;
-      const int end = valid.x + valid.width - 1;
       for (int y = valid.y + 1; y < valid.y + valid.height - 1; ++y) {
         const std::array layers = {octave.row(i - 1, y), octave.row(i, y), octave.row(i + 1, y)};
         kernels.maxima_row(layers.data(), octave.stride, octave.samples.width, min_response,
                            is_maximum_.data());
-        for (int x = next_marked(is_maximum_.data(), first, end); x < end;
-             x = next_marked(is_maximum_.data(), x + 1, end)) {
-          if (equals_earlier_neighbour(o, i, x, y)) continue;
-          maxima.push_back({layers[1][x], static_cast<std::uint16_t>(x),
-                            static_cast<std::uint16_t>(y), static_cast<std::uint8_t>(o),
-                            static_cast<std::uint8_t>(i)});
-        }
+        append_marked(o, i, y, maxima);
       }
     }
   }

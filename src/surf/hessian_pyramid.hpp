@@ -71,13 +71,16 @@ class HessianPyramid {
     std::array<std::vector<float>, kIntervals> layers;
 
     [[nodiscard]] const float* row(int interval, int y) const {
-      return layers[static_cast<std::size_t>(interval)].data() + y * stride;
+      return layers[static_cast<std::size_t>(interval)].data() + std::ptrdiff_t{y} * stride;
+    }
+    [[nodiscard]] float* row(int interval, int y) {
+      return layers[static_cast<std::size_t>(interval)].data() + std::ptrdiff_t{y} * stride;
     }
   };
 
   void compute(const cv::Rect& tile, int octave, int first_interval, const Kernels& kernels);
   void take_from_below(int octave, int interval);
-
+  void append_marked(int octave, int interval, int y, std::vector<Maximum>& maxima) const;
   [[nodiscard]] bool equals_earlier_neighbour(int octave, int interval, int x, int y) const;
 
   const IntegralImage* integral_ = nullptr;

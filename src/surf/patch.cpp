@@ -42,7 +42,7 @@ void upright_patch(const IntegralImage& integral, const Keypoint& keypoint, cons
 
 void turned_patch(const IntegralImage& integral, const Keypoint& keypoint, Patch& patch) {
   const cv::Size size = integral.size_px();
-  const int side = std::max(1, static_cast<int>(keypoint.scale + 0.5F));
+  const int side = std::max(1, cvRound(keypoint.scale));
   const float norm = 1.0F / static_cast<float>(side * side);
   const float cosine = std::cos(keypoint.angle_rad) * keypoint.scale;
   const float sine = std::sin(keypoint.angle_rad) * keypoint.scale;
@@ -66,7 +66,7 @@ float dominant_angle(const IntegralImage& integral, const Keypoint& keypoint) {
   constexpr int kSectors = 72;
   constexpr int kWindow = 12;  // 60 degrees
   constexpr float kSigma = 2.5F;
-  const int step = std::max(1, static_cast<int>(keypoint.scale + 0.5F));
+  const int step = std::max(1, cvRound(keypoint.scale));
   const int x0 = static_cast<int>(keypoint.x_px + 1.0F);
   const int y0 = static_cast<int>(keypoint.y_px + 1.0F);
   const cv::Size size = integral.size_px();

@@ -70,10 +70,11 @@ class SurfExtractor::Impl {
     const int rows = std::max(1, size.height / kGridCellPx);
     const auto cell_of = [&](const Maximum& m) {
       const int step = HessianPyramid::step_px(m.octave);
-      return static_cast<std::size_t>(m.y * step * rows / size.height * columns +
-                                      m.x * step * columns / size.width);
+      const int row = m.y * step * rows / size.height;
+      const int cell = row * columns + m.x * step * columns / size.width;
+      return static_cast<std::size_t>(cell);
     };
-    const auto num_cells = static_cast<std::size_t>(columns * rows);
+    const auto num_cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
     const std::size_t limit =
         kMaxShares * static_cast<std::size_t>(options_.max_keypoints) / num_cells + 1;
     cells_.resize(std::max(cells_.size(), num_cells));

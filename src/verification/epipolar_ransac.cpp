@@ -178,7 +178,7 @@ void EpipolarRansac::normalize(std::span<const Pair> pairs, double max_error_px)
     mean.x1 += p.x1;
     mean.y1 += p.y1;
   }
-  const float n = static_cast<float>(pairs.size());
+  const auto n = static_cast<float>(pairs.size());
   mean = {mean.x0 / n, mean.y0 / n, mean.x1 / n, mean.y1 / n};
   float spread = 0;
   pairs_.clear();
@@ -215,32 +215,28 @@ void EpipolarRansac::mark(const cv::Matx33d& model) {
 }
 
 /// The matrix that fits all inliers best, by the eight-point algorithm.
+cv::Matx33d EpipolarRansac::fit() const {
+  cv::Matx<double, 9, 9> squares = cv::Matx<double, 9, 9>::zeros();
+  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+    if (is_inlier_[k] == 0) continue;
+    const cv::Matx<double, 9, 1> row(constraint(pairs_[k]).data());
+    squares += row * row.t();
+  }
+  cv::Matx<double, 9, 1> values;
+  cv::Matx<double, 9, 9> vectors;
+  cv::eigen(squares, values, vectors);
+  const cv::Matx33d full(vectors.row(8).val);
+  cv::Matx31d w;
+  cv::Matx33d u;
+  cv::Matx33d vt;
+  cv::SVD::compute(full, w, u, vt);
+  return u * cv::Matx33d::diag({w(0), w(1), 0.0}) * vt;
+}
+
 void EpipolarRansac::refit() {
   for (int i = 0; i < kRefits && best_score_.inliers > static_cast<int>(kSample); ++i) {
     mark(best_);
-    cv::Matx<double, 9, 9> squares = cv::Matx<double, 9, 9>::zeros();
-    for (std::size_t k = 0; k < pairs_.size(); ++k) {
-      if (is_inlier_[k] == 0) continue;
-      const Row row = constraint(pairs_[k]);
-      for (int a = 0; a < 9; ++a) {
-        for (int b = a; b < 9; ++b) {
-          squares(a, b) += row[static_cast<std::size_t>(a)] * row[static_cast<std::size_t>(b)];
-        }
-      }
-    }
-    for (int a = 0; a < 9; ++a) {
-      for (int b = 0; b < a; ++b) squares(a, b) = squares(b, a);
-    }
-    cv::Matx<double, 9, 1> values;
-    cv::Matx<double, 9, 9> vectors;
-    cv::eigen(squares, values, vectors);
-    cv::Matx33d model;
-    for (int k = 0; k < 9; ++k) model.val[k] = vectors(8, k);
-    cv::Matx31d w;
-    cv::Matx33d u;
-    cv::Matx33d vt;
-    cv::SVD::compute(model, w, u, vt);
-    model = u * cv::Matx33d::diag({w(0), w(1), 0.0}) * vt;
+    const cv::Matx33d model = fit();
     const Score refitted = score(model);
     if (refitted.cost >= best_score_.cost) return;
     best_ = model;

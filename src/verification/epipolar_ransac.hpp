@@ -41,6 +41,7 @@ class EpipolarRansac {
   void normalize(std::span<const Pair> pairs, double max_error_px);
   [[nodiscard]] Score score(const cv::Matx33d& model) const;
   void offer(const cv::Matx33d& model);
+  [[nodiscard]] cv::Matx33d fit() const;
   void refit();
   void mark(const cv::Matx33d& model);
 
