@@ -3,6 +3,7 @@
 // How retrieval grows with the map: see scripts/bench_retrieval.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -30,7 +31,7 @@ using Clock = std::chrono::steady_clock;
 /// Each query is asked so often, and its least time counts: other programs share the machine.
 constexpr int kRepetitions = 5;
 constexpr std::size_t kQueries = 100;  ///< of each kind
-constexpr int kScans = 3;              ///< full scans that are timed
+constexpr std::size_t kScans = 3;      ///< full scans that are timed
 /// A frame of a run is no candidate for the next 10 s.
 constexpr PlaceId kExclusion = 300;
 constexpr std::size_t kFramesTimed = 50;
@@ -49,7 +50,8 @@ double thread_ms() {
 
 double percentile(std::vector<double> values, double fraction) {
   std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(fraction * static_cast<double>(values.size() - 1) + 0.5)];
+  const auto at = std::lround(fraction * static_cast<double>(values.size() - 1));
+  return values[static_cast<std::size_t>(at)];
 }
 
 /// Memory of this process that no file backs, in bytes.
@@ -114,8 +116,8 @@ Asked ask(const PlaceIndex& index, const std::vector<BinaryContent>& queries) {
 double full_scan_ms(const PlaceIndex& index, const std::vector<BinaryContent>& queries) {
   const RetrievalOptions options;
   std::vector<double> times;
-  for (int scan = 0; scan < kScans; ++scan) {
-    const BinaryContent& query = queries[static_cast<std::size_t>(scan)];
+  for (std::size_t scan = 0; scan < kScans; ++scan) {
+    const BinaryContent& query = queries[scan];
     const double start_ms = thread_ms();
     std::vector<BinaryContent> shifted;
     for (int s = -options.shift_tolerance_columns; s <= options.shift_tolerance_columns; ++s) {
@@ -281,7 +283,7 @@ void measure_hard_maps(const LongSequence& map, const LongSequence& elsewhere) {
 
 /// The same places and queries in IndexBinaryFlat: Hamming distance, no shifts, 20 nearest.
 void run_faiss(LongSequence& map, const LongSequence& elsewhere, std::vector<Row>& rows) {
-  faiss::IndexBinaryFlat index(kContentSide * kContentSide);
+  faiss::IndexBinaryFlat index(8 * sizeof(BinaryContent));
   index.xb.reserve(rows.back().places * sizeof(BinaryContent));
   map.restart();
   for (Row& row : rows) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/core.h>
 #include <opencv2/imgproc.hpp>
 
 #include "loopbit/gray_image.hpp"
@@ -100,7 +101,7 @@ LongSequence::LongSequence(const std::string& data, const std::vector<std::strin
   for (const std::string& name : real) {
     if (data.empty()) break;
     Source source{{}, nullptr};
-    const auto images = open_source(data + '/' + name + "/images");
+    const auto images = open_source(fmt::format("{}/{}/images", data, name));
     for (Frame frame; images->next(frame);) source.key_frames.push_back(saliency_of(frame.image));
     sources_.push_back(std::move(source));
   }

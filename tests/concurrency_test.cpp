@@ -19,7 +19,10 @@ namespace {
 std::vector<BinaryContent> coherent_contents(std::size_t num_contents) {
   std::mt19937_64 random(2019);
   std::vector<BinaryContent> contents(num_contents);
-  for (std::uint64_t& row : contents[0].rows) row = random() & random();
+  for (std::uint64_t& row : contents[0].rows) {
+    const std::uint64_t bits = random();
+    row = bits & random();
+  }
   for (std::size_t i = 1; i < num_contents; ++i) {
     contents[i] = contents[i - 1];
     for (int change = 0; change < 20; ++change) {

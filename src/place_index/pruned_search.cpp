@@ -18,7 +18,9 @@ constexpr std::size_t kRun = 16;
 
 /// The level whose stretches are searched best first.
 constexpr std::size_t kSortedLevel = 1;
-/// So many of them go first, then kBatchGrowth times as many, and so on.
+/// Of the coarsest stretches, one in so many is searched before the others are looked into.
+constexpr std::size_t kCoarseToFirst = 64;
+/// At kSortedLevel so many go first, then kBatchGrowth times as many, and so on.
 constexpr std::size_t kFirstBatch = 8;
 constexpr std::size_t kBatchGrowth = 8;
 /// So many are descended into together.
@@ -69,15 +71,29 @@ std::vector<Candidate> PrunedSearch::run() {
   for (std::size_t first = 0; first < whole; first += kRun) {
     bound_run(0, first, std::min(first + kRun, whole), coarse);
   }
-  // The most promising stretch gives a first floor, below which many others need no look inside.
-  if (!coarse.empty()) {
-    const auto best = std::min_element(coarse.begin(), coarse.end(), has_larger_bound<Stretch>);
-    search_inside({*best});
-    coarse.erase(best);
-  }
+  // The most promising stretches give a first floor, below which most others need no look inside.
+  search_inside(take_best(coarse, 1 + coarse.size() / kCoarseToFirst));
   search_rest();
   search_inside(coarse);
   return std::move(found_).answer();
+}
+
+/// Moves the `wanted` stretches of largest bound, or all, out of `stretches`; both keep their
+/// order.
+std::vector<PrunedSearch::Stretch> PrunedSearch::take_best(std::vector<Stretch>& stretches,
+                                                           std::size_t wanted) {
+  if (stretches.size() <= wanted) return std::exchange(stretches, {});
+  std::vector<Stretch> sorted = stretches;
+  const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(wanted) - 1;
+  std::nth_element(sorted.begin(), last, sorted.end(), has_larger_bound<Stretch>);
+  std::vector<Stretch> best;
+  std::vector<Stretch> others;
+  for (const Stretch& stretch : stretches) {
+    const bool is_best = stretch.bound >= last->bound && best.size() < wanted;
+    (is_best ? best : others).push_back(stretch);
+  }
+  stretches.swap(others);
+  return best;
 }
 
 /// Searches coarsest stretches.

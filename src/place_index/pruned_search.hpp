@@ -53,6 +53,7 @@ class PrunedSearch {
   void bound_children(std::size_t level, std::span<const Stretch> parents,
                       std::vector<Stretch>& kept);
   void descend(std::size_t level, std::span<Stretch> stretches);
+  static std::vector<Stretch> take_best(std::vector<Stretch>& stretches, std::size_t wanted);
   void search_inside(const std::vector<Stretch>& coarse);
   void search_best_first(std::size_t level, std::vector<Stretch> stretches);
   void search_rest();
