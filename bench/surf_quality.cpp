@@ -57,9 +57,11 @@ Outcome compare(const Features& a, const Features& b) {
   return {points_of(a), points_of(b), verify(a, b).inliers.size()};
 }
 
-Outcome ours(const cv::Mat1b& a, const cv::Mat1b& b, bool upright) {
-  const SurfOptions options{.upright = upright};
-  return compare(extract_surf(a, options), extract_surf(b, options));
+Method ours(int max_keypoints) {
+  return [max_keypoints](const cv::Mat1b& a, const cv::Mat1b& b, bool upright) {
+    const SurfOptions options{.max_keypoints = max_keypoints, .upright = upright};
+    return compare(extract_surf(a, options), extract_surf(b, options));
+  };
 }
 
 Outcome dlibs(const cv::Mat1b& a, const cv::Mat1b& b, bool upright) {
@@ -207,12 +209,17 @@ std::string measure(const Case& pairs, const Method& method) {
 }  // namespace
 
 void print_quality(const fs::path& data) {
-  fmt::print(
-      "\nMean inliers (repeatability) by pair; {} keypoints, ORB {}\n{:36} {:>16} {:>16} {:>16}\n",
-      SurfOptions().max_keypoints, kOrbKeypoints, "pairs", "loopbit", "dlib", "ORB");
+  const int budget = SurfOptions().max_keypoints;
+  const auto headed = [](const char* name, int keypoints) {
+    return fmt::format("{} {}", name, keypoints);
+  };
+  constexpr const char* kRow = "{:32} {:>14} {:>14} {:>14} {:>14}\n";
+  fmt::print("\nMean inliers (repeatability) by pair and number of keypoints\n");
+  fmt::print(kRow, "pairs", headed("loopbit", budget), headed("dlib", budget),
+             headed("loopbit", kOrbKeypoints), headed("ORB", kOrbKeypoints));
   for (const Case& pairs : cases(data)) {
-    fmt::print("{:36} {:>16} {:>16} {:>16}\n", pairs.name, measure(pairs, ours),
-               measure(pairs, dlibs), measure(pairs, orbs));
+    fmt::print(kRow, pairs.name, measure(pairs, ours(budget)), measure(pairs, dlibs),
+               measure(pairs, ours(kOrbKeypoints)), measure(pairs, orbs));
   }
 }
 
