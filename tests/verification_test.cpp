@@ -268,7 +268,7 @@ TEST(EpipolarInliers, AreAboutAsManyAsOpenCvFinds) {
   for (int run = 0; run < 10; ++run) {
     Random random(run);
     const TwoViews views = two_views(random, 50, 50);
-    const double expected = static_cast<double>(opencv_inliers(views));
+    const auto expected = static_cast<double>(opencv_inliers(views));
     EXPECT_NEAR(static_cast<double>(inliers_of(views).size()), expected, 0.1 * expected) << run;
   }
 }

@@ -68,24 +68,28 @@ void HessianPyramid::build(const IntegralImage& integral, const Kernels& kernels
 
 void HessianPyramid::compute(const cv::Rect& tile, int octave, int first_interval,
                              const Kernels& kernels) {
-  const int step = step_px(octave);
-  const int part = step / kRowStep_px;
+  const std::ptrdiff_t step = step_px(octave);
+  const std::ptrdiff_t part = step / kRowStep_px;
   Octave& of = octaves_[static_cast<std::size_t>(octave)];
   const IntegralView integral = integral_->view();
-  const int count = std::min(tile.width, of.samples.width - tile.x);
+  const std::ptrdiff_t count = std::min(tile.width, of.samples.width - tile.x);
   for (int y = 0; y < tile.height; ++y) {
+    const std::ptrdiff_t y_px = y * step;
     for (int i = first_interval; i < kIntervals; ++i) {
-      const int reach = (3 * lobe_px(octave, i) - 1) / 2;
-      if (y * step < reach || y * step + reach >= integral_->size_px().height) continue;
+      const std::ptrdiff_t lobe = lobe_px(octave, i);
+      const std::ptrdiff_t reach = (3 * lobe - 1) / 2;
+      if (y_px < reach || y_px + reach >= integral_->size_px().height) continue;
       float* out = of.row(i, y) + tile.x;
       if (part == 1) {
-        kernels.hessian_row(integral, y * step, tile.x, count, lobe_px(octave, i), out);
+        kernels.hessian_row(integral, y_px, tile.x, count, lobe, out);
         continue;
       }
       std::array<float, kHessianRun> responses{};
-      kernels.hessian_row(integral, y * step, tile.x * part, (count - 1) * part + 1,
-                          lobe_px(octave, i), responses.data());
-      for (int x = 0; x < count; ++x) out[x] = responses[static_cast<std::size_t>(x * part)];
+      kernels.hessian_row(integral, y_px, tile.x * part, (count - 1) * part + 1, lobe,
+                          responses.data());
+      for (std::ptrdiff_t x = 0; x < count; ++x) {
+        out[x] = responses[static_cast<std::size_t>(x * part)];
+      }
     }
   }
 }
