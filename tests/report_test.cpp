@@ -44,8 +44,8 @@ class ReportTest : public test::ScratchTest {
     test::Random random;
     for (int frame = 0; frame < 4; ++frame) {
       evidence.add(frame, test::view(frame),
-                   {cv::Mat1f(64, 64, 1.0F),
-                    test::random_content(random, 0.2),
+                   {test::random_content(random, 0.2),
+                    cv::Mat1f(64, 64, 1.0F),
                     {{{0.25F, 0.5F}, {0.75F, 1.0F}}}});
     }
     evidence.finish();

@@ -168,7 +168,7 @@ class EvidenceFileTest : public test::ScratchTest {
  protected:
   /// Evidence about `frames` frames, each of its own.
   std::string write_evidence(int frames) {
-    const std::string file = path("evidence.db");
+    std::string file = path("evidence.db");
     EvidenceWriter writer(file);
     for (int frame = 0; frame < frames; ++frame) {
       writer.add(frame, test::view(frame), evidence(frame));
@@ -181,7 +181,7 @@ class EvidenceFileTest : public test::ScratchTest {
     test::Random random(frame);
     cv::Mat1f saliency(64, 64, 0.0F);
     saliency(frame % 64, 3) = 2.0F;
-    Evidence evidence{saliency, test::random_content(random, 0.3), {}};
+    Evidence evidence{test::random_content(random, 0.3), saliency, {}};
     for (int i = 0; i < frame; ++i) {
       evidence.inliers.push_back({{0.25F, 0.5F}, {0.125F, static_cast<float>(i)}});
     }
@@ -341,40 +341,55 @@ TEST(Run, TheSizeIsThatOfTheFirstUsableFrame) {
   EXPECT_NE(told.detections[2].status, Status::unreadable);
 }
 
-TEST(Run, TellsWhatADetectionRestsOnAndChangesNothingByIt) {
+/// The detections of a window of one frame; `on_evidence` may be empty.
+std::vector<Detection> detect_all(
+    const std::vector<Frame>& list,
+    const std::function<void(const Detection&, const cv::Mat&, const Evidence&)>& on_evidence) {
+  FrameSource source(list);
+  LoopDetectorOptions options;
+  options.exclusion.frames = 1;
+  options.exclusion.min_frames = 1;
+  LoopDetector detector(options);
+  std::vector<Detection> detections;
+  const std::atomic<bool> stop{false};
+  run(source, detector,
+      {[&](const Detection& detection) { detections.push_back(detection); },
+       [](const std::string&) {}, on_evidence},
+      stop);
+  return detections;
+}
+
+/// Three views, the second of them unreadable, and the same views again.
+std::vector<Frame> two_rounds() {
   auto list = frames(6);
-  list[2] = {"broken.png", 1.0, {}, "'broken.png' is empty."};
-  const auto again = [&](bool wants_evidence, std::vector<PlaceId>& told) {
-    FrameSource source(list);
-    LoopDetectorOptions options;
-    options.exclusion.frames = 1;
-    options.exclusion.min_frames = 1;
-    LoopDetector detector(options);
-    std::vector<Detection> detections;
-    RunListener listener{[&](const Detection& detection) { detections.push_back(detection); },
-                         [](const std::string&) {}};
-    if (wants_evidence) {
-      listener.on_evidence = [&](const Detection& d, const cv::Mat& image, const Evidence& seen) {
-        told.push_back(d.frame);
-        EXPECT_EQ(static_cast<int>(seen.inliers.size()), d.inliers);
-        EXPECT_EQ(seen.content, binary_content(image));
-        for (const PointPair& pair : seen.inliers) {
-          EXPECT_TRUE(cv::Rect2f(0, 0, 1, 1).contains(pair.query));
-          EXPECT_TRUE(cv::Rect2f(0, 0, 1, 1).contains(pair.match));
-        }
-      };
-    }
-    const std::atomic<bool> stop{false};
-    run(source, detector, listener, stop);
-    return detections;
-  };
   for (std::size_t i = 3; i < list.size(); ++i) list[i].image = test::view(static_cast<int>(i) - 3);
+  list[1] = {"broken.png", 0.5, {}, "'broken.png' is empty."};
+  return list;
+}
+
+TEST(Run, TellsWhatADetectionRestsOn) {
   std::vector<PlaceId> told;
-  const auto with = again(true, told);
-  const auto without = again(false, told);
-  EXPECT_EQ(told, (std::vector<PlaceId>{0, 1, 3, 4, 5}));
+  int most_inliers = 0;
+  (void)detect_all(two_rounds(),
+                   [&](const Detection& d, const cv::Mat& image, const Evidence& seen) {
+                     told.push_back(d.frame);
+                     most_inliers = std::max(most_inliers, d.inliers);
+                     EXPECT_EQ(static_cast<int>(seen.inliers.size()), d.inliers);
+                     EXPECT_EQ(seen.content, binary_content(image));
+                     for (const PointPair& pair : seen.inliers) {
+                       EXPECT_TRUE(cv::Rect2f(0, 0, 1, 1).contains(pair.query));
+                       EXPECT_TRUE(cv::Rect2f(0, 0, 1, 1).contains(pair.match));
+                     }
+                   });
+  EXPECT_EQ(told, (std::vector<PlaceId>{0, 2, 3, 4, 5}));
+  EXPECT_GT(most_inliers, 8);
+}
+
+TEST(Run, ToldOrNotTheDecisionsAreTheSame) {
+  const auto with =
+      detect_all(two_rounds(), [](const Detection&, const cv::Mat&, const Evidence& /*seen*/) {});
+  const auto without = detect_all(two_rounds(), {});
   ASSERT_EQ(with.size(), without.size());
-  EXPECT_TRUE(std::any_of(with.begin(), with.end(), [](const auto& d) { return d.inliers > 8; }));
   for (std::size_t i = 0; i < with.size(); ++i) {
     EXPECT_EQ(with[i].status, without[i].status);
     EXPECT_EQ(with[i].match, without[i].match);

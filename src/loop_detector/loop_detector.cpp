@@ -102,7 +102,7 @@ class LoopDetector::Impl {
   }
 
   [[nodiscard]] Evidence evidence(const Observation& seen, const Detection& detection) const {
-    Evidence evidence{seen.saliency, seen.content, {}};
+    Evidence evidence{seen.content, seen.saliency, {}};
     if (detection.inliers == 0) return evidence;
     const Features& place = features(*detection.match);
     const Verification result = verify(seen.features, place, options_.verification);

@@ -201,7 +201,7 @@ Json matrix_json(const EvidenceReader& evidence, int frames, int shift_tolerance
 /// The record, or null where the run was cut off.
 Json record_of(const ReportRun& run) {
   if (!run.run || run.run->record_json.empty()) return nullptr;
-  const Json record = Json::parse(run.run->record_json, nullptr, false);
+  Json record = Json::parse(run.run->record_json, nullptr, false);
   if (!record.is_object() || !record.contains("options")) {
     throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is no record of a run: it was "
                                               "changed after loopbit wrote it; run again.",

@@ -20,8 +20,8 @@ struct PointPair {
 
 /// What a detection rests on, for people to look at; see LoopDetector::process.
 struct Evidence {
-  cv::Mat1f saliency;  ///< 64 x 64
   BinaryContent content;
+  cv::Mat1f saliency;              ///< 64 x 64
   std::vector<PointPair> inliers;  ///< of the frame and its match, accepted or not
 };
 
