@@ -16,6 +16,7 @@
 #include "loopbit/kernels.hpp"
 
 #include "agreement.hpp"
+#include "place_memory.hpp"
 #include "recent_view.hpp"
 
 namespace loopbit {
@@ -53,12 +54,21 @@ cv::Point2f relative_position(const Features& features, int index) {
 
 class LoopDetector::Impl {
  public:
-  explicit Impl(const LoopDetectorOptions& options)
+  Impl(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
       : options_(options),
+        memory_(std::move(map)),
         agreement_(options.decision),
         surf_(options.surf),
         verifier_(options.verification) {
     validate(options);
+    PlaceId latest_step = 0;
+    memory_.restore([&](const BinaryContent& content) {
+      const PlaceId place = index_.add(content);
+      const bool is_step =
+          place == 0 || similarity(content, index_.content(latest_step)) < kUnmovedSimilarity;
+      if (is_step) latest_step = place;
+      return is_step;
+    });
   }
 
   /// One frame as the detector sees it: all that remember() needs.
@@ -68,13 +78,15 @@ class LoopDetector::Impl {
     Features features;
     RecentView::Look look;
     std::vector<VerifiedCandidate> verified;
+    std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
   };
 
   /// The algorithm of Wang et al. 2019, section III.
   Detection detect(const cv::Mat& image, std::optional<double> timestamp_s,
                    Observation& seen) const {
     check_time(timestamp_s);
-    Detection detection{.frame = index_.size(), .timestamp_s = timestamp_s};
+    memory_.release();
+    Detection detection{.frame = size(), .timestamp_s = timestamp_s};
     Stopwatch stopwatch;
 
     // Step 1: what the image is recognised by.
@@ -104,7 +116,7 @@ class LoopDetector::Impl {
   [[nodiscard]] Evidence evidence(const Observation& seen, const Detection& detection) const {
     Evidence evidence{seen.content, seen.saliency, {}};
     if (detection.inliers == 0) return evidence;
-    const Features& place = features(*detection.match);
+    const Features& place = features(seen.best->candidate.place);
     const Verification result = verify(seen.features, place, options_.verification);
     evidence.inliers.reserve(result.inliers.size());
     for (const Match& match : result.inliers) {
@@ -114,25 +126,65 @@ class LoopDetector::Impl {
     return evidence;
   }
 
-  void remember(Observation seen, std::optional<double> timestamp_s) {
-    const PlaceId place = add_place(seen.content, std::move(seen.features), timestamp_s);
+  /// How each candidate scored, in the order in which decide() ranks them.
+  [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen) const {
+    for (std::size_t i = 0; i < seen.verified.size(); ++i) {
+      find_geometry(seen.features, seen.verified[i], verifications_[i]);
+    }
+    if (seen.best) {
+      std::erase_if(seen.verified, [&](const VerifiedCandidate& v) {
+        return v.candidate.place == seen.best->candidate.place;
+      });
+      seen.verified.push_back(*seen.best);
+    }
+    std::stable_sort(seen.verified.begin(), seen.verified.end(),
+                     [&](const auto& a, const auto& b) { return rank(a, seen) > rank(b, seen); });
+    std::vector<RankedPlace> places;
+    places.reserve(seen.verified.size());
+    for (const VerifiedCandidate& v : seen.verified) {
+      places.push_back({.place = origin(v.candidate.place),
+                        .score = agreement_.score(v, seen.look.is_step),
+                        .similarity = v.candidate.similarity,
+                        .matches = v.matches,
+                        .inliers = v.inliers});
+    }
+    return places;
+  }
+
+  void remember(Observation seen, const Detection& detection) {
+    const PlaceId place = add_place(seen.content, std::move(seen.features), detection);
     recent_view_.remember(place, seen.look);
     if (seen.look.is_step) agreement_.remember(std::move(seen.verified));
   }
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
-  PlaceId skip(std::optional<double> timestamp_s) {
+  Detection skip(std::optional<double> timestamp_s) {
     const double last_s = times_s_.empty() ? 0.0 : times_s_.back();
     const bool is_usable = timestamp_s && std::isfinite(*timestamp_s) && *timestamp_s > last_s;
-    return add_place(BinaryContent{}, Features{}, is_usable ? *timestamp_s : last_s);
+    Detection detection{.frame = size(),
+                        .timestamp_s = is_usable ? *timestamp_s : last_s,
+                        .status = Status::unreadable};
+    add_place(BinaryContent{}, Features{}, detection);
+    detection.timestamp_s = timestamp_s;
+    return detection;
   }
 
-  [[nodiscard]] PlaceId size() const { return index_.size(); }
+  /// Frames of this session.
+  [[nodiscard]] PlaceId size() const { return index_.size() - memory_.session_begin(); }
   [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
 
  private:
-  [[nodiscard]] const Features& features(PlaceId place) const {
-    return features_[static_cast<std::size_t>(place)];
+  [[nodiscard]] const Features& features(PlaceId place) const { return memory_.features(place); }
+
+  /// See RankedPlace::place.
+  [[nodiscard]] SessionFrame origin(PlaceId place) const {
+    const PlaceId begin = memory_.session_begin();
+    return place < begin ? memory_.origin(place) : SessionFrame{0, place - begin};
+  }
+
+  /// See VerifiedCandidate::step.
+  [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const {
+    return place < memory_.session_begin() ? memory_.step_of(place) : recent_view_.step_of(place);
   }
 
   void check_time(std::optional<double> timestamp_s) const {
@@ -151,10 +203,9 @@ class LoopDetector::Impl {
     }
   }
 
-  PlaceId add_place(const BinaryContent& content, Features features,
-                    std::optional<double> timestamp_s) {
-    features_.push_back(std::move(features));
-    times_s_.push_back(timestamp_s.value_or(0.0));
+  PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection) {
+    memory_.add(detection, content, std::move(features));
+    times_s_.push_back(detection.timestamp_s.value_or(0.0));
     return index_.add(content);
   }
 
@@ -162,8 +213,7 @@ class LoopDetector::Impl {
   [[nodiscard]] VerifiedCandidate matched(const Features& query, const Candidate& candidate,
                                           Verification& result) const {
     verifier_.match(query, features(candidate.place), result);
-    return {candidate, recent_view_.step_of(candidate.place),
-            static_cast<int>(result.matches.size())};
+    return {candidate, step_of(candidate.place), static_cast<int>(result.matches.size())};
   }
 
   /// The second half: their geometry.
@@ -205,7 +255,7 @@ class LoopDetector::Impl {
     const bool is_step =
         recent_view_.empty() ||
         similarity(seen.content, index_.content(recent_view_.latest_step())) < kUnmovedSimilarity;
-    return recent_view_.look(size(), is_step, [&](PlaceId place) {
+    return recent_view_.look(index_.size(), is_step, [&](PlaceId place) {
       if (is_window_fixed()) return true;
       VerifiedCandidate recent = matched(seen.features, {place, 0}, verification_);
       find_geometry(seen.features, recent, verification_);
@@ -222,13 +272,13 @@ class LoopDetector::Impl {
                                            std::optional<double> timestamp_s) const {
     const ExclusionOptions& exclusion = options_.exclusion;
     PlaceId first = look.begin;
-    if (exclusion.frames > 0) first = size() - exclusion.frames;
+    if (exclusion.frames > 0) first = index_.size() - exclusion.frames;
     if (exclusion.seconds > 0) {
       const auto recent =
           std::upper_bound(times_s_.begin(), times_s_.end(), *timestamp_s - exclusion.seconds);
-      first = static_cast<PlaceId>(recent - times_s_.begin());
+      first = memory_.session_begin() + static_cast<PlaceId>(recent - times_s_.begin());
     }
-    return std::max(0, std::min(first, size() - exclusion.min_frames));
+    return std::max(memory_.session_begin(), std::min(first, index_.size() - exclusion.min_frames));
   }
 
   [[nodiscard]] auto rank(const VerifiedCandidate& v, const Observation& seen) const {
@@ -254,7 +304,7 @@ class LoopDetector::Impl {
     return best;
   }
 
-  void decide(const Observation& seen, PlaceId end, Detection& detection) const {
+  void decide(Observation& seen, PlaceId end, Detection& detection) const {
     if (seen.verified.empty()) {
       detection.status = end == 0 ? Status::no_earlier_place : Status::no_similar_place;
       return;
@@ -267,7 +317,12 @@ class LoopDetector::Impl {
     // Below, a neighbour is no likelier to be right than any other place.
     if (score() > options_.decision.chance_inliers) best = refined(best, seen, end);
     detection.status = accepted() ? Status::loop : reason_of_rejection(best, options_.verification);
-    detection.match = best.candidate.place;
+    seen.best = best;
+    if (best.candidate.place < memory_.session_begin()) {
+      detection.earlier_match = memory_.origin(best.candidate.place);
+    } else {
+      detection.match = best.candidate.place - memory_.session_begin();
+    }
     detection.score = score();
     detection.similarity = best.candidate.similarity;
     detection.matches = best.matches;
@@ -276,8 +331,8 @@ class LoopDetector::Impl {
 
   LoopDetectorOptions options_;
   PlaceIndex index_;
-  std::vector<Features> features_;  ///< of each place
-  std::vector<double> times_s_;     ///< of each place; 0 where there is none
+  PlaceMemory memory_;
+  std::vector<double> times_s_;  ///< of each frame of this session; 0 where there is none
   RecentView recent_view_;
   Agreement agreement_;
   // Working memory, which makes const functions unfit for threads.
@@ -287,8 +342,9 @@ class LoopDetector::Impl {
   mutable Verification verification_;                ///< of one other place
 };
 
-LoopDetector::LoopDetector(const LoopDetectorOptions& options)
-    : impl_(std::make_unique<Impl>(options)) {}
+LoopDetector::LoopDetector(const LoopDetectorOptions& options) : LoopDetector(options, nullptr) {}
+LoopDetector::LoopDetector(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
+    : impl_(std::make_unique<Impl>(options, std::move(map))) {}
 LoopDetector::~LoopDetector() = default;
 LoopDetector::LoopDetector(LoopDetector&&) noexcept = default;
 LoopDetector& LoopDetector::operator=(LoopDetector&&) noexcept = default;
@@ -298,19 +354,19 @@ Detection LoopDetector::process(const cv::Mat& image, std::optional<double> time
   Impl::Observation seen;
   Detection detection = impl_->detect(image, timestamp_s, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
-  impl_->remember(std::move(seen), timestamp_s);
+  impl_->remember(std::move(seen), detection);
   return detection;
 }
 
-Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timestamp_s) const {
+Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timestamp_s,
+                              std::vector<RankedPlace>* ranking) const {
   Impl::Observation seen;
-  return impl_->detect(image, timestamp_s, seen);
+  Detection detection = impl_->detect(image, timestamp_s, seen);
+  if (ranking) *ranking = impl_->ranked(seen);
+  return detection;
 }
 
-Detection LoopDetector::skip(std::optional<double> timestamp_s) {
-  return {
-      .frame = impl_->skip(timestamp_s), .timestamp_s = timestamp_s, .status = Status::unreadable};
-}
+Detection LoopDetector::skip(std::optional<double> timestamp_s) { return impl_->skip(timestamp_s); }
 
 PlaceId LoopDetector::size() const { return impl_->size(); }
 

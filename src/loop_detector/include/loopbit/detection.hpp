@@ -36,18 +36,37 @@ struct StepTimes {
   double verification_ms = 0;  ///< step 3, matching, geometry and decision
 };
 
+/// A frame of one of a map's sessions.
+struct SessionFrame {
+  int session = 0;  ///< from 1, in the order in which the map met them
+  int frame = 0;    ///< in its session, from 0
+
+  bool operator==(const SessionFrame&) const = default;
+};
+
 /// The answer for one frame, with the numbers behind it.
 struct Detection {
-  PlaceId frame = 0;  ///< number of the frame, from 0; also its place, if it was added
+  PlaceId frame = 0;  ///< number of the frame in this session, from 0
   std::optional<double> timestamp_s = std::nullopt;
   Status status = Status::no_earlier_place;
   std::optional<PlaceId> match =
-      std::nullopt;       ///< the best candidate, accepted or not; none without candidates
+      std::nullopt;  ///< the best candidate, accepted or not, if it is a frame of this session
+  std::optional<SessionFrame> earlier_match =
+      std::nullopt;       ///< the same, if it is of an earlier session of the map
   double score = 0;       ///< what was compared with decision.min_score
   double similarity = 0;  ///< xi of query and match
   int matches = 0;        ///< features shared by query and match, one to one
   int inliers = 0;        ///< those that one epipolar geometry explains
   StepTimes times = {};
+};
+
+/// A place that an image may show, with the numbers behind it; see LoopDetector::query.
+struct RankedPlace {
+  SessionFrame place;  ///< session 0 = of this session
+  double score = 0;
+  double similarity = 0;
+  int matches = 0;
+  int inliers = 0;
 };
 
 }  // namespace loopbit

@@ -5,12 +5,14 @@
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
 #include "loopbit/detection.hpp"
 #include "loopbit/evidence.hpp"
 #include "loopbit/loop_detector_options.hpp"
+#include "loopbit/map_storage.hpp"
 
 namespace loopbit {
 
@@ -22,11 +24,17 @@ namespace loopbit {
 /// answers on any processor. Not thread-safe; use one detector a thread.
 ///
 /// Memory: at most 50 KB a place by default, nearly all of it features, and working memory of its
-/// own, which it keeps from frame to frame.
+/// own, which it keeps from frame to frame. With a map, features are the map's to keep: 700 bytes a
+/// place remain.
 class LoopDetector {
  public:
   /// Throws Error (kind option) if `options` are not valid.
   explicit LoopDetector(const LoopDetectorOptions& options = {});
+
+  /// Continues `map` with a new session: all places of earlier sessions are candidates, whatever
+  /// the exclusion window. Features are kept there, and fetched when a candidate is verified.
+  /// Throws as above and what the map throws. Cost: some microseconds a place of the map.
+  LoopDetector(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map);
   ~LoopDetector();
   LoopDetector(const LoopDetector&) = delete;
   LoopDetector& operator=(const LoopDetector&) = delete;
@@ -40,19 +48,21 @@ class LoopDetector {
   /// before the last one; needed only where the exclusion window is given in seconds.
   /// `evidence`: if not null, is given what the answer rests on, at the cost of one more
   /// verification. Throws Error (kind input), and stays as it was, if the image or the time cannot
-  /// be used.
+  /// be used, and what MapStorage::add throws.
   Detection process(const cv::Mat& image, std::optional<double> timestamp_s = std::nullopt,
                     Evidence* evidence = nullptr);
 
-  /// What process() would answer now, without adding anything.
+  /// What process() would answer now, without adding anything. `ranking`: if not null, is given all
+  /// candidates, best first, at the cost of verifying each of them; only the first can be a loop.
   [[nodiscard]] Detection query(const cv::Mat& image,
-                                std::optional<double> timestamp_s = std::nullopt) const;
+                                std::optional<double> timestamp_s = std::nullopt,
+                                std::vector<RankedPlace>* ranking = nullptr) const;
 
   /// Counts a frame without a usable image, so that frame numbers keep step with the camera. It is
   /// never a candidate.
   Detection skip(std::optional<double> timestamp_s = std::nullopt);
 
-  /// Frames so far.
+  /// Frames of this session so far.
   [[nodiscard]] PlaceId size() const;
 
   [[nodiscard]] const LoopDetectorOptions& options() const;

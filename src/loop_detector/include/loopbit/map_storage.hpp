@@ -1,0 +1,42 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "loopbit/binary_content.hpp"
+#include "loopbit/detection.hpp"
+#include "loopbit/place_index.hpp"
+#include "loopbit/surf.hpp"
+
+namespace loopbit {
+
+/// What a LoopDetector needs of a map that outlives it; see map_file.hpp for the one on disk. The
+/// map's places are numbered from 0: those of earlier sessions in order of session and frame, then
+/// each frame that is added. One thread at a time.
+class MapStorage {
+ public:
+  using Visit = std::function<void(const SessionFrame&, const BinaryContent&)>;
+
+  MapStorage() = default;
+  virtual ~MapStorage() = default;
+  MapStorage(const MapStorage&) = delete;
+  MapStorage& operator=(const MapStorage&) = delete;
+  MapStorage(MapStorage&&) = delete;
+  MapStorage& operator=(MapStorage&&) = delete;
+
+  /// Calls back with each place of earlier sessions, in order.
+  virtual void for_each_earlier_place(const Visit& visit) = 0;
+
+  /// The features of a place; without any if they are lost. Never null.
+  virtual std::shared_ptr<const Features> features(PlaceId place) = 0;
+
+  /// Takes the next frame of this session, as number detection.frame. Where the detection is
+  /// `unreadable`, content and features are empty, and nothing but its number is kept. Throws Error
+  /// (kind output) if this frame, or one before, could not be kept.
+  virtual void add(const Detection& detection, const BinaryContent& content,
+                   std::shared_ptr<const Features> features) = 0;
+};
+
+}  // namespace loopbit

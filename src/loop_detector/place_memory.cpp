@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "place_memory.hpp"
+
+#include <utility>
+
+namespace loopbit {
+namespace {
+
+/// Sessions are so many steps apart: no neighbours, whatever agreement_steps is.
+constexpr int kStepsBetweenSessions = 1000;
+
+}  // namespace
+
+void PlaceMemory::add_earlier(const SessionFrame& origin, bool is_step) {
+  int step = 0;
+  if (!earlier_.empty()) {
+    const EarlierPlace& last = earlier_.back();
+    const bool same_session = last.origin.session == origin.session;
+    step = last.step + (same_session ? static_cast<int>(is_step) : kStepsBetweenSessions);
+  }
+  earlier_.push_back({origin, step});
+}
+
+std::ptrdiff_t PlaceMemory::step_of(PlaceId place) const {
+  const std::ptrdiff_t step = earlier_[static_cast<std::size_t>(place)].step;
+  return step - earlier_.back().step - kStepsBetweenSessions;
+}
+
+void PlaceMemory::add(const Detection& detection, const BinaryContent& content, Features features) {
+  if (!map_) {
+    features_.push_back(std::move(features));
+    return;
+  }
+  map_->add(detection, content, std::make_shared<const Features>(std::move(features)));
+}
+
+const Features& PlaceMemory::features(PlaceId place) const {
+  if (!map_) return features_[static_cast<std::size_t>(place)];
+  held_.push_back(map_->features(place));
+  return *held_.back();
+}
+
+}  // namespace loopbit
