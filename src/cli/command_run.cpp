@@ -3,6 +3,8 @@
 #include <memory>
 #include <utility>
 
+#include "loopbit/error.hpp"
+
 #include "commands.hpp"
 #include "session.hpp"
 
@@ -19,6 +21,9 @@ struct RunFlags {
 
 int run_command(const RunFlags& flags) {
   Session session;
+  if (flags.session.out.empty() && flags.session.map.empty()) {
+    throw Error(ErrorKind::option, "Where to? Name a folder by --out, a map by --map, or both.");
+  }
   flags.truth.check();
   session.evaluation = flags.truth.evaluation();
   session.truth = [&](const FrameTimes& times_s) {
@@ -45,9 +50,12 @@ void add_run(CLI::App& app, int& exit_code) {
                    "A folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
                    "folder, a text file listing images, a video, or camera:N")
       ->required();
-  command->add_option("--out", flags->session.out, "Folder for loops.csv, run.json and report.html")
-      ->type_name("DIR")
-      ->required();
+  command
+      ->add_option(
+          "--out", flags->session.out,
+          "Folder for loops.csv, run.json and report.html; with --map, MAP_session_N unless "
+          "given")
+      ->type_name("DIR");
   flags->session.add_to(*command);
   command->add_option("--every", flags->every, "Read every N-th frame only")
       ->type_name("N")

@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <thread>
 #include <utility>
 
@@ -16,6 +17,7 @@
 #include "loopbit/evaluation.hpp"
 #include "loopbit/evidence_file.hpp"
 #include "loopbit/finished_run.hpp"
+#include "loopbit/map_file.hpp"
 #include "loopbit/run_folder.hpp"
 #include "loopbit/runner.hpp"
 
@@ -79,6 +81,12 @@ void drive(ImageSource& source, LoopDetector& detector, RunFolder& folder, bool 
   if (evidence) evidence->finish();
 }
 
+/// Where a run is kept whose user named a map only: "town.db" and session 2 give "town_session_2".
+std::string folder_beside(const std::string& map, int session) {
+  const auto stem = std::filesystem::path(map).replace_extension().string();
+  return fmt::format("{}_session_{}", stem, session);
+}
+
 /// Scores the run in `folder` into `record`, and keeps what it was scored by.
 void score(const Session& session, RunFolder& folder, RunRecord& record) {
   const MatchList list = match_list(folder.detections());
@@ -95,6 +103,11 @@ void score(const Session& session, RunFolder& folder, RunRecord& record) {
 
 void SessionFlags::add_to(CLI::App& command) {
   command.add_flag("--overwrite", overwrite, "Replace an earlier run in the output folder");
+  command
+      .add_option("--map", map,
+                  "Continue this map, made if there is none: earlier sessions' places are "
+                  "recognised, too")
+      ->type_name("MAP.db");
   command.add_option("--config", config, "Settings file, JSON; see 'loopbit options --json'")
       ->type_name("FILE");
   command
@@ -137,8 +150,15 @@ int run_session(Session session, const SessionFlags& flags) {
                    .limit = session.limit,
                    .threads = thread_count(flags.threads)};
   // Before the folder: what refuses the run may not cost an earlier one.
-  LoopDetector detector(record.options);
-  RunFolder folder(flags.out, flags.overwrite);
+  std::shared_ptr<MapWriter> map;
+  if (!flags.map.empty()) {
+    map = std::make_shared<MapWriter>(flags.map, record.options, session.input);
+    record.map_path = flags.map;
+    record.map_session = map->session();
+  }
+  LoopDetector detector(record.options, map);
+  RunFolder folder(flags.out.empty() ? folder_beside(flags.map, record.map_session) : flags.out,
+                   flags.overwrite);
   cv::setNumThreads(record.threads);
   if (record.threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
 
@@ -152,6 +172,7 @@ int run_session(Session session, const SessionFlags& flags) {
   };
   try {
     drive(*session.source, detector, folder, !flags.no_report);
+    if (map) map->finish();
     record.wall_s = elapsed_s();
     if (!stop_requested) check_readable(folder.detections(), session.input);
     score(session, folder, record);
@@ -164,7 +185,8 @@ int run_session(Session session, const SessionFlags& flags) {
     throw;
   }
   finish(stop_requested ? "interrupt" : "end");
-  if (!flags.no_report) write_report(folder.report_path(), {report_run(flags.out)}, flags.report);
+  if (!flags.no_report)
+    write_report(folder.report_path(), {report_run(folder.path())}, flags.report);
   print_summary(record, folder, !flags.no_report);
   return stop_requested ? interrupted : success;
 }

@@ -21,7 +21,8 @@ namespace loopbit::cli {
 
 /// The flags that every command with a detector shares.
 struct SessionFlags {
-  std::string out;
+  std::string out;  ///< empty = beside the map, named after it
+  std::string map;  ///< empty = none
   bool overwrite = false;
   std::string config;
   std::vector<std::string> settings;  ///< "section.field=value"

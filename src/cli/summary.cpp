@@ -58,6 +58,9 @@ void print_summary(const RunRecord& record, const RunFolder& folder, bool has_re
   if (record.score) print_score(record.score->decision);
   print_times(record, detections);
   fmt::print("written    {0}/loops.csv, {0}/run.json\n", folder.path());
+  if (!record.map_path.empty()) {
+    fmt::print("map        {}, session {}\n", record.map_path, record.map_session);
+  }
   if (has_report) fmt::print("report     {}\n", folder.report_path());
 }
 

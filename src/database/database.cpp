@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "database.hpp"
+#include "loopbit/database.hpp"
 
 #include <utility>
 
@@ -10,14 +10,32 @@
 #include "loopbit/error.hpp"
 
 namespace loopbit {
+namespace {
 
-Database::Database(std::string path, Access access) : path_(std::move(path)), access_(access) {
+constexpr int kMaxRowBytes = 256 << 20;
+/// How long to wait for another process that has the file locked for a moment.
+constexpr int kBusyTimeout_ms = 10'000;
+
+bool is_damage(int result) {
+  const int primary = result & 0xff;
+  return primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB || primary == SQLITE_IOERR;
+}
+
+}  // namespace
+
+Database::Database(std::string path, Access access, Remedies remedies)
+    : path_(std::move(path)), access_(access), remedies_(std::move(remedies)) {
   const int flags =
       access == Access::create ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY;
   sqlite3* handle = nullptr;
   const int result = sqlite3_open_v2(path_.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);  // must be closed even if it could not be opened
   if (result != SQLITE_OK) fail();
+  sqlite3_busy_timeout(handle, kBusyTimeout_ms);
+  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kMaxRowBytes);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
+  execute("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0");
 }
 
 void Database::Close::operator()(sqlite3* handle) const { sqlite3_close(handle); }
@@ -26,18 +44,21 @@ void Database::execute(const std::string& sql) const {
   if (sqlite3_exec(handle(), sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) fail();
 }
 
+std::int64_t Database::integer(const std::string& sql) const {
+  Statement statement(*this, sql);
+  return statement.step() ? statement.integer(0) : 0;
+}
+
 void Database::fail() const {
   const char* reason = handle_ ? sqlite3_errmsg(handle()) : "out of memory";
-  if (access_ == Access::create) {
+  const int code = handle_ ? sqlite3_errcode(handle()) : SQLITE_NOMEM;
+  const bool unusable = code == SQLITE_CORRUPT || code == SQLITE_NOTADB;
+  if (access_ == Access::create && !unusable) {
     throw Error(ErrorKind::output,
-                fmt::format("'{}' cannot be written ({}): check the free space and the "
-                            "permissions of its folder, or run without it, by --no-report.",
-                            path_, reason));
+                fmt::format("'{}' cannot be written ({}): {}.", path_, reason, remedies_.write));
   }
   throw Error(ErrorKind::input,
-              fmt::format("'{}' cannot be read ({}): it is damaged or no file of loopbit's; delete "
-                          "it to go on without it.",
-                          path_, reason));
+              fmt::format("'{}' cannot be read ({}): {}.", path_, reason, remedies_.read));
 }
 
 Statement::Statement(const Database& database, const std::string& sql) : database_(database) {
@@ -54,10 +75,24 @@ void Statement::bind(int parameter, std::int64_t value) {
   if (sqlite3_bind_int64(statement_.get(), parameter, value) != SQLITE_OK) database_.fail();
 }
 
+void Statement::bind(int parameter, double value) {
+  if (sqlite3_bind_double(statement_.get(), parameter, value) != SQLITE_OK) database_.fail();
+}
+
 void Statement::bind(int parameter, std::span<const unsigned char> bytes) {
   const int result =
       sqlite3_bind_blob64(statement_.get(), parameter, bytes.data(), bytes.size(), SQLITE_STATIC);
   if (result != SQLITE_OK) database_.fail();
+}
+
+void Statement::bind(int parameter, std::string_view text) {
+  const int result = sqlite3_bind_text64(statement_.get(), parameter, text.data(), text.size(),
+                                         SQLITE_STATIC, SQLITE_UTF8);
+  if (result != SQLITE_OK) database_.fail();
+}
+
+void Statement::bind_null(int parameter) {
+  if (sqlite3_bind_null(statement_.get(), parameter) != SQLITE_OK) database_.fail();
 }
 
 bool Statement::step() {
@@ -67,10 +102,29 @@ bool Statement::step() {
   return false;
 }
 
+Statement::Step Statement::step_if_readable() {
+  const int result = sqlite3_step(statement_.get());
+  if (result == SQLITE_ROW) return Step::row;
+  if (result == SQLITE_DONE) return Step::end;
+  if (!is_damage(result)) database_.fail();
+  return Step::damaged;
+}
+
 void Statement::reset() { sqlite3_reset(statement_.get()); }
 
 std::int64_t Statement::integer(int column) const {
   return sqlite3_column_int64(statement_.get(), column);
+}
+
+double Statement::real(int column) const { return sqlite3_column_double(statement_.get(), column); }
+
+bool Statement::is_null(int column) const {
+  return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
+}
+
+std::string Statement::text(int column) const {
+  const auto characters = bytes(column);
+  return {characters.begin(), characters.end()};
 }
 
 std::span<const unsigned char> Statement::bytes(int column) const {

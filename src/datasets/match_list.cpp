@@ -88,7 +88,7 @@ class Reader {
     }
     const int query = frame(row, cells[columns_.frame ? *columns_.frame : *columns_.query]);
     if (columns_.frame) begin_frame(row, cells, query);
-    if (cells[*columns_.match].empty()) return;
+    if (is_elsewhere(cells[*columns_.match])) return;
     list_.matches.push_back({.query = query,
                              .match = frame(row, cells[*columns_.match]),
                              .score = columns_.score ? number(row, cells[*columns_.score]) : 1.0,
@@ -98,6 +98,11 @@ class Reader {
   MatchList take() { return std::move(list_); }
 
  private:
+  /// No match, or, as loopbit writes it, one in another recording: "session:frame".
+  [[nodiscard]] bool is_elsewhere(std::string_view cell) const {
+    return cell.empty() || (columns_.frame && cell.find(':') != std::string_view::npos);
+  }
+
   void begin_frame(const TextRow& row, const Cells& cells, int frame) {
     const std::size_t expected = list_.times_s.size();
     if (static_cast<std::size_t>(frame) != expected) {

@@ -12,9 +12,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "loopbit/error.hpp"
-
-#include "database.hpp"
+#include "loopbit/database.hpp"
 
 namespace loopbit {
 namespace {
@@ -27,6 +25,14 @@ static_assert(sizeof(PointPair) == 4 * sizeof(float));
 constexpr int kFramesPerTransaction = 32;
 constexpr int kJpegQuality = 75;
 constexpr int kFormatVersion = 1;
+
+Database open_evidence(const std::string& path, Database::Access access) {
+  return {path,
+          access,
+          {.write = "check the free space and the permissions of its folder, or run without it, by "
+                    "--no-report",
+           .read = "it is damaged or no file of loopbit's; delete it to go on without it"}};
+}
 
 /// 8 bits, one channel or three.
 cv::Mat displayable(const cv::Mat& image) {
@@ -83,7 +89,8 @@ std::vector<PointPair> inliers_from(std::span<const unsigned char> bytes) {
 
 class EvidenceWriter::Impl {
  public:
-  explicit Impl(const std::string& path) : database_(path, Database::Access::create) {
+  explicit Impl(const std::string& path)
+      : database_(open_evidence(path, Database::Access::create)) {
     database_.execute(fmt::format(
         "PRAGMA journal_mode = WAL; PRAGMA synchronous = OFF; PRAGMA user_version = {}; "
         "CREATE TABLE frame (frame INTEGER PRIMARY KEY, picture BLOB, saliency BLOB, content BLOB, "
@@ -97,7 +104,7 @@ class EvidenceWriter::Impl {
     if (pending_ == 0) database_.execute("BEGIN");
     const Bytes picture = picture_jpeg(image);
     const Bytes saliency = saliency_png(evidence.saliency);
-    insert_->bind(1, frame);
+    insert_->bind(1, std::int64_t{frame});
     insert_->bind(2, picture);
     insert_->bind(3, saliency);
     insert_->bind(4, bytes_of(std::span<const std::uint64_t>(evidence.content.rows)));
@@ -135,12 +142,12 @@ void EvidenceWriter::finish() { impl_->finish(); }
 class EvidenceReader::Impl {
  public:
   explicit Impl(const std::string& path)
-      : database_(path, Database::Access::read),
+      : database_(open_evidence(path, Database::Access::read)),
         row_(database_, "SELECT picture, saliency, content, inliers FROM frame WHERE frame = ?1") {}
 
   bool read(PlaceId frame, StoredEvidence& evidence) {
     row_.reset();
-    row_.bind(1, frame);
+    row_.bind(1, std::int64_t{frame});
     if (!row_.step()) return false;
     const auto picture = row_.bytes(0);
     evidence.picture_jpeg.assign(picture.begin(), picture.end());

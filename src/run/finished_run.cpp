@@ -49,7 +49,12 @@ class Row {
 
   template <typename T>
   [[nodiscard]] T number(std::size_t column) const {
-    const std::string_view text = cell(column);
+    return number_in<T>(cell(column), column);
+  }
+
+  /// `text`: a part of the column's cell.
+  template <typename T>
+  [[nodiscard]] T number_in(std::string_view text, std::size_t column) const {
     T value{};
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size()) fail(column);
@@ -111,21 +116,34 @@ Status status_from(const Row& row, std::size_t column) {
   return *found;
 }
 
+/// See match_cell() in run_folder.cpp.
+void read_match(const Row& row, std::size_t column, Detection& detection) {
+  const std::string_view cell = row.cell(column);
+  const auto colon = cell.find(':');
+  if (colon == std::string_view::npos) {
+    detection.match = row.number_if_any<PlaceId>(column);
+    return;
+  }
+  detection.earlier_match = {.session = row.number_in<int>(cell.substr(0, colon), column),
+                             .frame = row.number_in<int>(cell.substr(colon + 1), column)};
+}
+
 Detection detection_from(const Row& row) {
   constexpr std::size_t kColumns = 12;
   row.check_columns(kColumns);
-  return {.frame = row.number<PlaceId>(0),
-          .timestamp_s = row.number_if_any<double>(1),
-          .status = status_from(row, 2),
-          .match = row.number_if_any<PlaceId>(3),
-          .score = row.number<double>(4),
-          .similarity = row.number<double>(5),
-          .matches = row.number<int>(6),
-          .inliers = row.number<int>(7),
-          .times = {.content_ms = row.number<double>(8),
-                    .retrieval_ms = row.number<double>(9),
-                    .features_ms = row.number<double>(10),
-                    .verification_ms = row.number<double>(11)}};
+  Detection detection{.frame = row.number<PlaceId>(0),
+                      .timestamp_s = row.number_if_any<double>(1),
+                      .status = status_from(row, 2),
+                      .score = row.number<double>(4),
+                      .similarity = row.number<double>(5),
+                      .matches = row.number<int>(6),
+                      .inliers = row.number<int>(7),
+                      .times = {.content_ms = row.number<double>(8),
+                                .retrieval_ms = row.number<double>(9),
+                                .features_ms = row.number<double>(10),
+                                .verification_ms = row.number<double>(11)}};
+  read_match(row, 3, detection);
+  return detection;
 }
 
 std::vector<std::optional<cv::Vec3d>> read_positions(const std::string& path, std::size_t frames) {

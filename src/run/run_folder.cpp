@@ -55,13 +55,20 @@ void make_folder(const fs::path& folder, bool overwrite) {
   }
 }
 
+/// "17", or "2:17" for frame 17 of session 2 of the map.
+std::string match_cell(const Detection& d) {
+  if (d.earlier_match) {
+    return fmt::format("{}:{}", d.earlier_match->session, d.earlier_match->frame);
+  }
+  return d.match ? fmt::format("{}", *d.match) : "";
+}
+
 std::string csv_row(const Detection& d) {
   const StepTimes& t = d.times;
   return fmt::format("{},{},{},{},{},{:.6f},{},{},{:.3f},{:.3f},{:.3f},{:.3f}\n", d.frame,
                      d.timestamp_s ? fmt::format("{:.6f}", *d.timestamp_s) : "",
-                     to_string(d.status), d.match ? fmt::format("{}", *d.match) : "", d.score,
-                     d.similarity, d.matches, d.inliers, t.content_ms, t.retrieval_ms,
-                     t.features_ms, t.verification_ms);
+                     to_string(d.status), match_cell(d), d.score, d.similarity, d.matches,
+                     d.inliers, t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
 }
 
 std::string processor_name() {
@@ -127,6 +134,9 @@ Json to_json(const RunRecord& record, const std::vector<Detection>& detections) 
             {"frames_per_s",
              record.wall_s > 0 ? static_cast<double>(detections.size()) / record.wall_s : 0.0},
             {"peak_memory_mib", peak_memory_mib()}};
+  if (!record.map_path.empty()) {
+    json["map"] = {{"path", record.map_path}, {"session", record.map_session}};
+  }
   if (record.score) json["score"] = Json::parse(to_json(*record.score, false));
   return json;
 }

@@ -6,25 +6,40 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 struct sqlite3;
 struct sqlite3_stmt;
 
 namespace loopbit {
 
-/// A SQLite file. Every failure is an Error that names the file; its kind is output for a writer,
-/// input for a reader.
+/// A SQLite file. Every failure is an Error that names the file and a remedy; its kind is output
+/// where something could not be written, else input. What a file says is never trusted: a hostile
+/// one may give wrong rows, but runs no code and takes no more than 256 MiB for a row.
 class Database {
  public:
-  enum class Access { create, read };
+  enum class Access {
+    create,  ///< for writing; made if it does not exist
+    read,
+  };
 
-  Database(std::string path, Access access);
+  /// Clauses that end the sentence of an error.
+  struct Remedies {
+    std::string write;
+    std::string read;  ///< also where a file to be written is damaged
+  };
+
+  Database(std::string path, Access access, Remedies remedies);
 
   /// Runs statements that give no rows.
   void execute(const std::string& sql) const;
 
+  /// The first column of the first row of what `sql` gives; 0 where there is none.
+  [[nodiscard]] std::int64_t integer(const std::string& sql) const;
+
   [[noreturn]] void fail() const;
   [[nodiscard]] sqlite3* handle() const { return handle_.get(); }
+  [[nodiscard]] const std::string& path() const { return path_; }
 
  private:
   struct Close {
@@ -33,23 +48,34 @@ class Database {
 
   std::string path_;
   Access access_;
+  Remedies remedies_;
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
 /// A prepared statement. Parameters count from 1, columns from 0. The database must outlive it.
 class Statement {
  public:
+  enum class Step { row, end, damaged };
+
   Statement(const Database& database, const std::string& sql);
 
   void bind(int parameter, std::int64_t value);
-  /// The bytes must stay where they are until the next reset().
+  void bind(int parameter, double value);
+  /// Bytes and text must stay where they are until the next reset().
   void bind(int parameter, std::span<const unsigned char> bytes);
+  void bind(int parameter, std::string_view text);
+  void bind_null(int parameter);
 
   /// True if there is a row, false at the end.
   bool step();
+  /// The same, but what cannot be read of a damaged file or disk is no Error.
+  Step step_if_readable();
   void reset();
 
   [[nodiscard]] std::int64_t integer(int column) const;
+  [[nodiscard]] double real(int column) const;
+  [[nodiscard]] bool is_null(int column) const;
+  [[nodiscard]] std::string text(int column) const;
   /// Valid until the next step() or reset().
   [[nodiscard]] std::span<const unsigned char> bytes(int column) const;
 

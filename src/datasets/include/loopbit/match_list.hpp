@@ -29,7 +29,8 @@ struct MatchList {
 /// rows with a match are candidates that were rejected) and `timestamp`; other columns are passed
 /// over. Without names rows are `query,match` or `query,match,score`. Where there is no score all
 /// matches have score 1. Rows with an empty match say that the frame has none. `#` begins a
-/// comment. If there is a column `frame`, every frame must have its row, in order, from 0. Throws
+/// comment. A match `S:F` is frame F of another recording, S: as none, in a file with a column
+/// `frame`. If there is a column `frame`, every frame must have its row, in order, from 0. Throws
 /// Error (kind input) that names file and line.
 MatchList read_match_list(const std::string& path);
 

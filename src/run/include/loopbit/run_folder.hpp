@@ -27,6 +27,8 @@ struct RunRecord {
   int every = 1;  ///< of the input's frames, every so-many-th was read
   int limit = 0;  ///< at most so many were read; 0 = all
   int threads = 1;
+  int map_session = 0;             ///< of this run, where there is a map
+  std::string map_path = {};       ///< empty = none
   std::string stopped_by = "end";  ///< "end", "interrupt", or the sentence of an error
   double wall_s = 0;               ///< reading and detecting
   std::optional<Evaluation> score = std::nullopt;

@@ -1,0 +1,134 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "batch_writer.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "loopbit/error.hpp"
+
+namespace loopbit {
+namespace {
+
+constexpr std::size_t kFramesPerBatch = 32;
+constexpr std::chrono::seconds kMaxDelay{1};
+/// 12 MB of features.
+constexpr std::size_t kMaxPendingFrames = 256;
+
+MapLoop loop_of(const Detection& detection, int session) {
+  return {
+      .query = {session, detection.frame},
+      .match = detection.earlier_match.value_or(SessionFrame{session, detection.match.value_or(0)}),
+      .score = detection.score,
+      .similarity = detection.similarity,
+      .matches = detection.matches,
+      .inliers = detection.inliers};
+}
+
+}  // namespace
+
+BatchWriter::BatchWriter(Database database, MapSession session, std::int64_t first_place)
+    : database_(std::move(database)),
+      rows_(database_),
+      session_(std::move(session)),
+      first_place_(first_place),
+      thread_([this] { commit_batches(); }) {}
+
+BatchWriter::~BatchWriter() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  added_.notify_all();
+  thread_.join();
+}
+
+void BatchWriter::add(AddedFrame frame) {
+  std::unique_lock lock(mutex_);
+  committed_.wait(lock, [&] { return error_ || pending_.size() < kMaxPendingFrames; });
+  if (error_) std::rethrow_exception(error_);
+  pending_.push_back(std::move(frame));
+  if (pending_.size() == 1 || pending_.size() >= kFramesPerBatch) added_.notify_all();
+}
+
+void BatchWriter::flush() {
+  std::unique_lock lock(mutex_);
+  in_a_hurry_ = true;
+  added_.notify_all();
+  committed_.wait(lock, [&] { return error_ || pending_.empty(); });
+  in_a_hurry_ = false;
+  if (error_) std::rethrow_exception(error_);
+}
+
+std::shared_ptr<const Features> BatchWriter::pending(int frame) const {
+  const std::lock_guard lock(mutex_);
+  const auto found =
+      std::lower_bound(pending_.begin(), pending_.end(), frame,
+                       [](const AddedFrame& a, int number) { return a.detection.frame < number; });
+  if (found == pending_.end() || found->detection.frame != frame) return nullptr;
+  return found->features;
+}
+
+std::int64_t BatchWriter::saved_frames() const {
+  const std::lock_guard lock(mutex_);
+  return saved_frames_;
+}
+
+void BatchWriter::close_log() {
+  try {
+    database_.execute("PRAGMA journal_mode = DELETE");
+  } catch (const Error&) {  // a reader holds the log; the last of them to close removes it
+  }
+}
+
+void BatchWriter::commit_batches() {
+  std::unique_lock lock(mutex_);
+  while (!stop_) {
+    added_.wait(lock, [&] { return stop_ || !pending_.empty(); });
+    added_.wait_for(lock, kMaxDelay,
+                    [&] { return stop_ || in_a_hurry_ || pending_.size() >= kFramesPerBatch; });
+    if (stop_) return;
+    const std::vector<AddedFrame> batch(pending_.begin(), pending_.end());
+    lock.unlock();
+    std::exception_ptr error;
+    try {
+      commit(batch);
+    } catch (...) {
+      error = std::current_exception();
+    }
+    lock.lock();
+    if (error) {
+      error_ = error;
+    } else {
+      pending_.erase(pending_.begin(),
+                     pending_.begin() + static_cast<std::ptrdiff_t>(batch.size()));
+      saved_frames_ += static_cast<std::int64_t>(batch.size());
+    }
+    committed_.notify_all();
+    if (error_) return;
+  }
+}
+
+void BatchWriter::commit(const std::vector<AddedFrame>& batch) {
+  database_.execute("BEGIN IMMEDIATE");
+  session_.frames = batch.back().detection.frame + 1;
+  rows_.write(session_);
+  for (const AddedFrame& frame : batch) write(frame);
+  database_.execute("COMMIT");
+}
+
+void BatchWriter::write(const AddedFrame& frame) {
+  const Detection& detection = frame.detection;
+  if (detection.status == Status::unreadable) return;
+  const bool has_time = detection.timestamp_s && std::isfinite(*detection.timestamp_s);
+  rows_.write(MapPlace{.id = first_place_ + detection.frame,
+                       .at = {session_.session, detection.frame},
+                       .timestamp_s = has_time ? detection.timestamp_s : std::nullopt,
+                       .content = frame.content},
+              *frame.features);
+  if (detection.status == Status::loop) rows_.write(loop_of(detection, session_.session));
+}
+
+}  // namespace loopbit

@@ -1,0 +1,75 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <condition_variable>
+#include <cstdint>
+#include <deque>
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "loopbit/database.hpp"
+#include "loopbit/map_file.hpp"
+
+#include "map_rows.hpp"
+
+namespace loopbit {
+
+/// A frame on its way to a map.
+struct AddedFrame {
+  Detection detection;
+  BinaryContent content;
+  std::shared_ptr<const Features> features;
+};
+
+/// Commits the frames of one session in batches, on a thread of its own. The id of frame k's place
+/// is first_place + k. One thread at a time may call it.
+class BatchWriter {
+ public:
+  BatchWriter(Database database, MapSession session, std::int64_t first_place);
+  /// Leaves what is not committed.
+  ~BatchWriter();
+  BatchWriter(const BatchWriter&) = delete;
+  BatchWriter& operator=(const BatchWriter&) = delete;
+  BatchWriter(BatchWriter&&) = delete;
+  BatchWriter& operator=(BatchWriter&&) = delete;
+
+  /// Waits where too many frames are pending. Throws the Error of an earlier frame.
+  void add(AddedFrame frame);
+
+  /// Waits until all is committed. Throws the Error if it cannot be.
+  void flush();
+
+  /// Of a frame that is not committed yet; else null.
+  [[nodiscard]] std::shared_ptr<const Features> pending(int frame) const;
+
+  [[nodiscard]] std::int64_t saved_frames() const;
+
+  /// After flush(): leaves one file without a log beside it, if no reader holds the log.
+  void close_log();
+
+ private:
+  void commit_batches();
+  void commit(const std::vector<AddedFrame>& batch);
+  void write(const AddedFrame& frame);
+
+  Database database_;
+  RowWriter rows_;
+  MapSession session_;  ///< session_.frames are committed; for the thread only
+  std::int64_t first_place_;
+
+  mutable std::mutex mutex_;  ///< guards all below
+  std::condition_variable added_;
+  std::condition_variable committed_;
+  std::deque<AddedFrame> pending_;
+  std::int64_t saved_frames_ = 0;
+  std::exception_ptr error_;
+  bool in_a_hurry_ = false;
+  bool stop_ = false;
+  std::thread thread_;  ///< last: it uses all the others
+};
+
+}  // namespace loopbit

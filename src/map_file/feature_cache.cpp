@@ -1,0 +1,35 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "feature_cache.hpp"
+
+#include <utility>
+
+namespace loopbit {
+namespace {
+
+std::size_t bytes_of(const Features& features) {
+  return sizeof features + features.keypoints.size() * (sizeof(Keypoint) + sizeof(Descriptor));
+}
+
+}  // namespace
+
+std::shared_ptr<const Features> FeatureCache::find(PlaceId place) {
+  const auto found = at_.find(place);
+  if (found == at_.end()) return nullptr;
+  entries_.splice(entries_.begin(), entries_, found->second);
+  return found->second->features;
+}
+
+void FeatureCache::add(PlaceId place, std::shared_ptr<const Features> features) {
+  if (find(place)) return;
+  bytes_ += bytes_of(*features);
+  entries_.push_front({place, std::move(features)});
+  at_[place] = entries_.begin();
+  while (bytes_ > max_bytes_) {
+    bytes_ -= bytes_of(*entries_.back().features);
+    at_.erase(entries_.back().place);
+    entries_.pop_back();
+  }
+}
+
+}  // namespace loopbit

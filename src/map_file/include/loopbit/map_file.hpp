@@ -1,0 +1,143 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "loopbit/binary_content.hpp"
+#include "loopbit/detection.hpp"
+#include "loopbit/loop_detector_options.hpp"
+#include "loopbit/map_storage.hpp"
+#include "loopbit/surf.hpp"
+
+namespace loopbit {
+
+/// One continuous recording in a map.
+struct MapSession {
+  int session = 0;          ///< from 1; never given twice in a map
+  std::string uid;          ///< 32 hexadecimal digits, the same in every copy of the session
+  std::string name;         ///< what was read, as the user named it
+  std::string started;      ///< UTC, "2026-11-21T15:04:05Z"
+  std::string loopbit;      ///< the version that wrote it
+  std::string options;      ///< of its detector, as to_json gives them
+  std::int64_t frames = 0;  ///< with the unreadable ones, which are no places
+};
+
+/// A place as a map has it.
+struct MapPlace {
+  std::int64_t id = 0;  ///< the row's key; never given twice in a map
+  SessionFrame at;
+  std::optional<double> timestamp_s = std::nullopt;
+  BinaryContent content = {};
+};
+
+/// A loop that was found when its query was added.
+struct MapLoop {
+  SessionFrame query;
+  SessionFrame match;
+  double score = 0;
+  double similarity = 0;
+  int matches = 0;
+  int inliers = 0;
+
+  bool operator==(const MapLoop&) const = default;
+};
+
+/// Features that were read lately are kept up to this many bytes, some 5,000 places.
+inline constexpr std::size_t kFeatureCacheBytes = std::size_t{256} << 20U;
+
+/// A map on disk, to be read, also while it is being written: a reader sees what was committed when
+/// it looked. docs/format.md describes the file. What is damaged is left out, never guessed: every
+/// row has a checksum. Not thread-safe; any number of readers.
+class MapReader : public MapStorage {
+ public:
+  using VisitPlace = std::function<void(const MapPlace&)>;
+
+  /// Throws Error (kind input) if there is no map, it is of a newer version, or it is damaged where
+  /// its tables are listed. Reads the sessions only.
+  explicit MapReader(const std::string& path);
+  ~MapReader() override;
+
+  [[nodiscard]] const std::vector<MapSession>& sessions() const;
+
+  /// The defaults, with the settings that the map's places were made with. Throws Error (kind
+  /// input) if no session says.
+  [[nodiscard]] LoopDetectorOptions options() const;
+
+  /// Calls back with every place that is whole, in order of id. A microsecond a place; features are
+  /// not touched.
+  void for_each_place(const VisitPlace& visit);
+
+  /// The loops that are whole, in the order in which they were found.
+  [[nodiscard]] std::vector<MapLoop> loops();
+
+  /// None if they are lost.
+  [[nodiscard]] std::optional<Features> features_of(const MapPlace& place);
+
+  /// One clause for each thing found damaged so far, such as "place 7 (session 1, frame 6): its
+  /// content differs from its checksum".
+  [[nodiscard]] const std::vector<std::string>& damage() const;
+
+  /// The file itself is looked at: what SQLite's integrity_check says, nothing if all is well.
+  [[nodiscard]] std::vector<std::string> check_structure() const;
+
+  [[nodiscard]] const std::string& path() const;
+
+  // For LoopDetector::query; add() throws Error (kind option).
+  void for_each_earlier_place(const Visit& visit) override;
+  std::shared_ptr<const Features> features(PlaceId place) override;
+  void add(const Detection& detection, const BinaryContent& content,
+           std::shared_ptr<const Features> features) override;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// A map on disk that a LoopDetector continues with a session of its own. A map has one writer.
+///
+/// Frames are handed to a thread that commits them in batches of 32 or, at the latest, after a
+/// second; what is committed survives SIGKILL and the loss of power. add() waits only where that
+/// thread is 256 frames behind. Features of the latest places are in memory, see
+/// kFeatureCacheBytes.
+class MapWriter : public MapStorage {
+ public:
+  /// Creates or continues the map at `path`; `name` says what the session reads. Throws Error
+  /// (kind output) if the map has a writer or cannot be written, (kind option) if it was made with
+  /// other settings of binary_content or surf, (kind input) as MapReader does. A session without
+  /// frames leaves no trace.
+  MapWriter(const std::string& path, const LoopDetectorOptions& options, const std::string& name);
+  /// Saves as finish() does, if it was not called, and swallows its error.
+  ~MapWriter() override;
+
+  /// The number of the session that is written.
+  [[nodiscard]] int session() const;
+
+  /// Frames of this session that are committed: nothing takes them away again.
+  [[nodiscard]] std::int64_t saved_frames() const;
+
+  /// Commits what was added so far. Throws Error (kind output).
+  void flush();
+
+  /// Commits the rest and closes the file, which then is one file without a log beside it. Throws
+  /// Error (kind output). Nothing may be added afterwards.
+  void finish();
+
+  /// Throws Error (kind input) where a place is damaged: a damaged map is not written to.
+  void for_each_earlier_place(const Visit& visit) override;
+  std::shared_ptr<const Features> features(PlaceId place) override;
+  void add(const Detection& detection, const BinaryContent& content,
+           std::shared_ptr<const Features> features) override;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace loopbit

@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <iterator>
+#include <map>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "loopbit/map_tools.hpp"
+
+namespace loopbit {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// A loop with the numbers of its frames, counted through all sessions.
+struct Edge {
+  std::int64_t query = 0;
+  std::int64_t match = 0;
+  MapLoop loop;
+};
+
+/// Loops of sessions that the map has no longer are none of its edges.
+std::vector<Edge> edges_of(MapReader& map) {
+  std::map<int, std::int64_t> first_frame;
+  std::int64_t frames = 0;
+  for (const MapSession& session : map.sessions()) {
+    first_frame[session.session] = std::exchange(frames, frames + session.frames);
+  }
+  std::vector<Edge> edges;
+  for (const MapLoop& loop : map.loops()) {
+    const auto query = first_frame.find(loop.query.session);
+    const auto match = first_frame.find(loop.match.session);
+    if (query == first_frame.end() || match == first_frame.end()) continue;
+    edges.push_back({query->second + loop.query.frame, match->second + loop.match.frame, loop});
+  }
+  return edges;
+}
+
+std::string csv(const std::vector<Edge>& edges) {
+  std::string text =
+      "query,match,score,query_session,query_frame,match_session,match_frame,similarity,matches,"
+      "inliers\n";
+  for (const auto& [query, match, loop] : edges) {
+    fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{:.6f},{},{}\n", query, match,
+                   loop.score, loop.query.session, loop.query.frame, loop.match.session,
+                   loop.match.frame, loop.similarity, loop.matches, loop.inliers);
+  }
+  return text;
+}
+
+Json to_json(const SessionFrame& at) { return {{"session", at.session}, {"frame", at.frame}}; }
+
+std::string json(const MapReader& map, const std::vector<Edge>& edges) {
+  Json json{{"sessions", Json::array()}, {"loops", Json::array()}};
+  for (const MapSession& session : map.sessions()) {
+    json["sessions"].push_back({{"session", session.session},
+                                {"uid", session.uid},
+                                {"name", session.name},
+                                {"started", session.started},
+                                {"frames", session.frames}});
+  }
+  for (const auto& [query, match, loop] : edges) {
+    json["loops"].push_back({{"query", to_json(loop.query)},
+                             {"match", to_json(loop.match)},
+                             {"score", loop.score},
+                             {"similarity", loop.similarity},
+                             {"matches", loop.matches},
+                             {"inliers", loop.inliers}});
+  }
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+}
+
+/// g2o's text format (github.com/RainerKuemmerle/g2o, "File format"): a vertex or edge a line.
+std::string g2o(const std::vector<Edge>& edges) {
+  constexpr const char* kIdentityPose = "0 0 0 0 0 0 1";
+  constexpr const char* kIdentityInformation = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1";
+  std::set<std::int64_t> frames;
+  for (const Edge& edge : edges) frames.insert({edge.query, edge.match});
+  std::string text;
+  for (const std::int64_t frame : frames) {
+    text += fmt::format("VERTEX_SE3:QUAT {} {}\n", frame, kIdentityPose);
+  }
+  for (const Edge& edge : edges) {
+    text += fmt::format("EDGE_SE3:QUAT {} {} {} {}\n", edge.match, edge.query, kIdentityPose,
+                        kIdentityInformation);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string export_loops(MapReader& map, ExportFormat format) {
+  const std::vector<Edge> edges = edges_of(map);
+  switch (format) {
+    case ExportFormat::csv:
+      return csv(edges);
+    case ExportFormat::json:
+      return json(map, edges);
+    case ExportFormat::g2o:
+      return g2o(edges);
+  }
+  return "";
+}
+
+}  // namespace loopbit

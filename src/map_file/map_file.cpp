@@ -1,0 +1,221 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/map_file.hpp"
+
+#include <ctime>
+#include <random>
+#include <utility>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include "loopbit/database.hpp"
+#include "loopbit/error.hpp"
+#include "loopbit/version.hpp"
+
+#include "batch_writer.hpp"
+#include "map_options.hpp"
+#include "map_rows.hpp"
+#include "map_schema.hpp"
+#include "stored_features.hpp"
+#include "writer_lock.hpp"
+
+namespace loopbit {
+namespace {
+
+/// 128 random bits in hexadecimal.
+std::string new_uid() {
+  std::random_device random;
+  std::string uid;
+  for (int i = 0; i < 4; ++i) uid += fmt::format("{:08x}", random());
+  return uid;
+}
+
+std::string now_utc() {
+  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
+}
+
+std::string with_more(const std::vector<std::string>& damage) {
+  const std::size_t more = damage.size() - 1;
+  return damage.front() + (more > 0 ? fmt::format(", and {} more", more) : "");
+}
+
+}  // namespace
+
+struct MapReader::Impl {
+  explicit Impl(const std::string& map_path)
+      : path(map_path),
+        database(open_map_for_reading(map_path)),
+        features(database),
+        stored(database),
+        sessions(read_sessions(database, damage)) {}
+
+  std::string path;
+  Database database;
+  FeatureReader features;
+  StoredFeatures stored;  ///< of the places that for_each_earlier_place gave
+  Damage damage;
+  std::vector<MapSession> sessions;
+};
+
+MapReader::MapReader(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
+MapReader::~MapReader() = default;
+
+const std::vector<MapSession>& MapReader::sessions() const { return impl_->sessions; }
+const std::vector<std::string>& MapReader::damage() const { return impl_->damage; }
+const std::string& MapReader::path() const { return impl_->path; }
+
+LoopDetectorOptions MapReader::options() const {
+  if (impl_->sessions.empty()) {
+    throw Error(
+        ErrorKind::input,
+        fmt::format("'{}' has no session; 'loopbit run INPUT --map' adds one.", impl_->path));
+  }
+  return options_of_shape(impl_->path, impl_->sessions.front().options);
+}
+
+void MapReader::for_each_place(const VisitPlace& visit) {
+  loopbit::for_each_place(impl_->database, visit, impl_->damage);
+}
+
+std::vector<MapLoop> MapReader::loops() { return read_loops(impl_->database, impl_->damage); }
+
+std::optional<Features> MapReader::features_of(const MapPlace& place) {
+  return impl_->features.read(place.id, place.at, impl_->damage);
+}
+
+std::vector<std::string> MapReader::check_structure() const {
+  std::vector<std::string> faults;
+  Statement rows(impl_->database, "PRAGMA integrity_check");
+  Statement::Step step = rows.step_if_readable();
+  for (; step == Statement::Step::row; step = rows.step_if_readable()) {
+    if (rows.text(0) != "ok") faults.push_back(rows.text(0));
+  }
+  if (step == Statement::Step::damaged) faults.emplace_back("the file cannot be read to its end");
+  return faults;
+}
+
+void MapReader::for_each_earlier_place(const Visit& visit) {
+  for_each_place([&](const MapPlace& place) {
+    impl_->stored.add(place.id, place.at);
+    visit(place.at, place.content);
+  });
+}
+
+std::shared_ptr<const Features> MapReader::features(PlaceId place) {
+  return impl_->stored.get(place, impl_->damage);
+}
+
+void MapReader::add(const Detection& /*detection*/, const BinaryContent& /*content*/,
+                    std::shared_ptr<const Features> /*features*/) {
+  throw Error(ErrorKind::option,
+              fmt::format("'{}' is open to be read: use LoopDetector::query, or open it by "
+                          "MapWriter.",
+                          impl_->path));
+}
+
+class MapWriter::Impl {
+ public:
+  Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name)
+      : lock_(path), writer_(begin_session(path, options, name)) {}
+
+  void finish() {
+    writer_->flush();
+    stored_.reset();
+    database_.reset();
+    writer_->close_log();
+  }
+
+  void for_each_earlier_place(const Visit& visit) {
+    for_each_place(
+        *database_,
+        [&](const MapPlace& place) {
+          stored_->add(place.id, place.at);
+          visit(place.at, place.content);
+        },
+        damage_);
+    if (damage_.empty()) return;
+    throw Error(ErrorKind::input,
+                fmt::format("'{0}' is damaged ({1}) and not written to; 'loopbit map check {0} "
+                            "--recover NEW.db' saves the rest in a new map.",
+                            database_->path(), with_more(damage_)));
+  }
+
+  std::shared_ptr<const Features> features(PlaceId place) {
+    if (auto found = stored_->find(place)) return found;
+    if (auto pending = writer_->pending(place - session_begin())) return pending;
+    return stored_->get(place, damage_);
+  }
+
+  void add(const Detection& detection, const BinaryContent& content,
+           std::shared_ptr<const Features> features) {
+    writer_->add({detection, content, features});
+    stored_->keep(stored_->size(), std::move(features));
+    stored_->add(first_place_ + detection.frame, {session_, detection.frame});
+    ++frames_;
+  }
+
+  [[nodiscard]] int session() const { return session_; }
+  [[nodiscard]] BatchWriter& writer() const { return *writer_; }
+
+ private:
+  std::unique_ptr<BatchWriter> begin_session(const std::string& path,
+                                             const LoopDetectorOptions& options,
+                                             const std::string& name) {
+    Database database = open_map_for_writing(path);
+    database_.emplace(open_map_for_reading(path));
+    stored_.emplace(*database_);
+    for (const MapSession& session : read_sessions(*database_, damage_)) {
+      check_same_shape(path, session.options, options);
+    }
+    session_ = next_session(database);
+    first_place_ = next_place(database);
+    MapSession session{.session = session_,
+                       .uid = new_uid(),
+                       .name = name,
+                       .started = now_utc(),
+                       .loopbit = kVersion,
+                       .options = to_json(options)};
+    return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_);
+  }
+
+  [[nodiscard]] PlaceId session_begin() const { return stored_->size() - frames_; }
+
+  WriterLock lock_;
+  int session_ = 0;
+  std::int64_t first_place_ = 0;
+  PlaceId frames_ = 0;                ///< of this session
+  std::optional<Database> database_;  ///< for reading; gone after finish()
+  std::optional<StoredFeatures> stored_;
+  Damage damage_;
+  std::unique_ptr<BatchWriter> writer_;
+};
+
+MapWriter::MapWriter(const std::string& path, const LoopDetectorOptions& options,
+                     const std::string& name)
+    : impl_(std::make_unique<Impl>(path, options, name)) {}
+
+MapWriter::~MapWriter() {
+  try {
+    impl_->finish();
+  } catch (const Error&) {  // told by finish(), to those who ask
+  }
+}
+
+int MapWriter::session() const { return impl_->session(); }
+std::int64_t MapWriter::saved_frames() const { return impl_->writer().saved_frames(); }
+void MapWriter::flush() { impl_->writer().flush(); }
+void MapWriter::finish() { impl_->finish(); }
+
+void MapWriter::for_each_earlier_place(const Visit& visit) { impl_->for_each_earlier_place(visit); }
+
+std::shared_ptr<const Features> MapWriter::features(PlaceId place) {
+  return impl_->features(place);
+}
+
+void MapWriter::add(const Detection& detection, const BinaryContent& content,
+                    std::shared_ptr<const Features> features) {
+  impl_->add(detection, content, std::move(features));
+}
+
+}  // namespace loopbit

@@ -1,0 +1,251 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "map_rows.hpp"
+
+#include <algorithm>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "row_codec.hpp"
+
+namespace loopbit {
+namespace {
+
+/// Behind a page that cannot be read, so many keys are tried in turn for the next one that can. A
+/// damaged page of contents holds 29 rows, one of the pages above it some 50,000.
+constexpr std::int64_t kMaxProbes = 200'000;
+
+/// Calls visit(row, key) for each row of `table` that can be read, in order of its key, which is
+/// the first of `columns`.
+template <typename Visit>
+void for_each_row(const Database& database, const std::string& table, const std::string& columns,
+                  Damage& damage, const Visit& visit) {
+  const std::string key = columns.substr(0, columns.find(','));
+  Statement rows(database, fmt::format("SELECT {} FROM {} WHERE {} >= ?1 ORDER BY {}", columns,
+                                       table, key, key));
+  std::int64_t next = 1;
+  std::int64_t damaged_from = 0;  // 0: not in a damaged stretch
+  for (std::int64_t probes = 0; probes < kMaxProbes;) {
+    rows.reset();
+    rows.bind(1, next);
+    Statement::Step step = rows.step_if_readable();
+    for (; step == Statement::Step::row; step = rows.step_if_readable()) {
+      const std::int64_t at = rows.integer(0);
+      if (at < next || at == std::numeric_limits<std::int64_t>::max()) break;  // out of order
+      if (damaged_from > 0) {
+        damage.push_back(fmt::format("{} {} to {}: a page of the file cannot be read", table,
+                                     damaged_from, at - 1));
+        damaged_from = 0;
+      }
+      visit(rows, at);
+      next = at + 1;
+    }
+    if (step == Statement::Step::end) {
+      if (damaged_from == 0) return;
+      break;
+    }
+    if (damaged_from == 0) damaged_from = next;
+    ++next;
+    ++probes;
+  }
+  damage.push_back(fmt::format("{} {} and after: the file cannot be read", table, damaged_from));
+}
+
+bool has_checksum(const Statement& row, int column, const Checksum& checksum) {
+  return row.integer(column) == checksum.value();
+}
+
+Checksum checksum_of(const MapSession& s) {
+  return Checksum()
+      .add(std::int64_t{s.session})
+      .add(s.frames)
+      .add(std::string_view(s.uid))
+      .add(std::string_view(s.name))
+      .add(std::string_view(s.started))
+      .add(std::string_view(s.loopbit))
+      .add(std::string_view(s.options));
+}
+
+Checksum checksum_of(const SessionFrame& at) {
+  return Checksum().add(std::int64_t{at.session}).add(std::int64_t{at.frame});
+}
+
+Checksum checksum_of(const MapPlace& place) {
+  return checksum_of(place.at)
+      .add(place.timestamp_s.value_or(0.0))
+      .add(content_bytes(place.content));
+}
+
+Checksum checksum_of(const MapLoop& loop) {
+  return checksum_of(loop.query)
+      .add(std::int64_t{loop.match.session})
+      .add(std::int64_t{loop.match.frame})
+      .add(loop.score)
+      .add(loop.similarity)
+      .add(std::int64_t{loop.matches})
+      .add(std::int64_t{loop.inliers});
+}
+
+/// What does not fit is no value of ours, and turns the checksum wrong.
+int narrow(std::int64_t value) {
+  return value >= 0 && value <= std::numeric_limits<int>::max() ? static_cast<int>(value) : -1;
+}
+
+SessionFrame session_frame(const Statement& row, int column) {
+  return {narrow(row.integer(column)), narrow(row.integer(column + 1))};
+}
+
+}  // namespace
+
+std::vector<MapSession> read_sessions(const Database& database, Damage& damage) {
+  std::vector<MapSession> sessions;
+  for_each_row(database, "session",
+               "session, uid, name, started, loopbit, options, frames, checksum", damage,
+               [&](const Statement& row, std::int64_t key) {
+                 MapSession session{.session = narrow(key),
+                                    .uid = row.text(1),
+                                    .name = row.text(2),
+                                    .started = row.text(3),
+                                    .loopbit = row.text(4),
+                                    .options = row.text(5),
+                                    .frames = row.integer(6)};
+                 if (has_checksum(row, 7, checksum_of(session))) {
+                   sessions.push_back(std::move(session));
+                 } else {
+                   damage.push_back(
+                       fmt::format("session {}: its description differs from its checksum", key));
+                 }
+               });
+  return sessions;
+}
+
+void for_each_place(const Database& database, const std::function<void(const MapPlace&)>& visit,
+                    Damage& damage) {
+  MapPlace place;
+  for_each_row(
+      database, "place", "place, session, frame, timestamp, content, checksum", damage,
+      [&](const Statement& row, std::int64_t key) {
+        place.id = key;
+        place.at = session_frame(row, 1);
+        place.timestamp_s.reset();
+        if (!row.is_null(3)) place.timestamp_s = row.real(3);
+        const auto content = content_from(row.bytes(4));
+        if (content) place.content = *content;
+        if (content && has_checksum(row, 5, checksum_of(place))) {
+          visit(place);
+        } else {
+          damage.push_back(fmt::format("place {}: its content differs from its checksum", key));
+        }
+      });
+}
+
+std::vector<MapLoop> read_loops(const Database& database, Damage& damage) {
+  std::vector<MapLoop> loops;
+  for_each_row(
+      database, "loop",
+      "loop, session, frame, match_session, match_frame, score, similarity, matches, "
+      "inliers, checksum",
+      damage, [&](const Statement& row, std::int64_t key) {
+        const MapLoop loop{.query = session_frame(row, 1),
+                           .match = session_frame(row, 3),
+                           .score = row.real(5),
+                           .similarity = row.real(6),
+                           .matches = narrow(row.integer(7)),
+                           .inliers = narrow(row.integer(8))};
+        if (has_checksum(row, 9, checksum_of(loop))) {
+          loops.push_back(loop);
+        } else {
+          damage.push_back(fmt::format("loop {}: its values differ from their checksum", key));
+        }
+      });
+  return loops;
+}
+
+FeatureReader::FeatureReader(const Database& database)
+    : row_(database, "SELECT features, checksum FROM features WHERE place = ?1") {}
+
+std::optional<Features> FeatureReader::read(std::int64_t place, const SessionFrame& at,
+                                            Damage& damage) {
+  row_.reset();
+  row_.bind(1, place);
+  std::optional<Features> features;
+  if (row_.step_if_readable() == Statement::Step::row) {
+    const auto bytes = row_.bytes(0);
+    if (has_checksum(row_, 1, checksum_of(at).add(bytes))) features = features_from(bytes);
+  }
+  row_.reset();  // ends the read, so that the log can be emptied
+  if (!features) {
+    damage.push_back(
+        fmt::format("place {} (session {}, frame {}): its features are missing or "
+                    "differ from their checksum",
+                    place, at.session, at.frame));
+  }
+  return features;
+}
+
+RowWriter::RowWriter(const Database& database)
+    : session_(database,
+               "INSERT INTO session VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (session) "
+               "DO UPDATE SET frames = ?7, checksum = ?8"),
+      place_(database, "INSERT INTO place VALUES (?1, ?2, ?3, ?4, ?5, ?6)"),
+      features_(database, "INSERT INTO features VALUES (?1, ?2, ?3)"),
+      loop_(database, "INSERT INTO loop VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)") {}
+
+void RowWriter::write(const MapSession& session) {
+  session_.bind(1, std::int64_t{session.session});
+  session_.bind(2, std::string_view(session.uid));
+  session_.bind(3, std::string_view(session.name));
+  session_.bind(4, std::string_view(session.started));
+  session_.bind(5, std::string_view(session.loopbit));
+  session_.bind(6, std::string_view(session.options));
+  session_.bind(7, session.frames);
+  session_.bind(8, checksum_of(session).value());
+  session_.step();
+  session_.reset();
+}
+
+void RowWriter::write(const MapPlace& place, const Features& features) {
+  place_.bind(1, place.id);
+  place_.bind(2, std::int64_t{place.at.session});
+  place_.bind(3, std::int64_t{place.at.frame});
+  place.timestamp_s ? place_.bind(4, *place.timestamp_s) : place_.bind_null(4);
+  place_.bind(5, content_bytes(place.content));
+  place_.bind(6, checksum_of(place).value());
+  place_.step();
+  place_.reset();
+  const std::vector<unsigned char> bytes = features_bytes(features);
+  features_.bind(1, place.id);
+  features_.bind(2, bytes);
+  features_.bind(3, checksum_of(place.at).add(bytes).value());
+  features_.step();
+  features_.reset();
+}
+
+void RowWriter::write(const MapLoop& loop) {
+  loop_.bind(1, std::int64_t{loop.query.session});
+  loop_.bind(2, std::int64_t{loop.query.frame});
+  loop_.bind(3, std::int64_t{loop.match.session});
+  loop_.bind(4, std::int64_t{loop.match.frame});
+  loop_.bind(5, loop.score);
+  loop_.bind(6, loop.similarity);
+  loop_.bind(7, std::int64_t{loop.matches});
+  loop_.bind(8, std::int64_t{loop.inliers});
+  loop_.bind(9, checksum_of(loop).value());
+  loop_.step();
+  loop_.reset();
+}
+
+// The sequence alone would do, but for damage.
+int next_session(const Database& database) {
+  return narrow(
+      1 + std::max(database.integer("SELECT max(session) FROM session"),
+                   database.integer("SELECT seq FROM sqlite_sequence WHERE name = 'session'")));
+}
+
+std::int64_t next_place(const Database& database) {
+  return 1 + std::max(database.integer("SELECT max(place) FROM place"),
+                      database.integer("SELECT seq FROM sqlite_sequence WHERE name = 'place'"));
+}
+
+}  // namespace loopbit

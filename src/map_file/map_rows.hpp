@@ -1,0 +1,62 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "loopbit/database.hpp"
+#include "loopbit/map_file.hpp"
+
+namespace loopbit {
+
+// The rows of a map, each with a checksum over its key and values, so that no damage passes for
+// data. Readers leave out what is damaged, and say so in `damage`, a clause a row or page.
+
+using Damage = std::vector<std::string>;
+
+std::vector<MapSession> read_sessions(const Database& database, Damage& damage);
+
+/// In order of id.
+void for_each_place(const Database& database, const std::function<void(const MapPlace&)>& visit,
+                    Damage& damage);
+
+std::vector<MapLoop> read_loops(const Database& database, Damage& damage);
+
+/// Reads features by place.
+class FeatureReader {
+ public:
+  explicit FeatureReader(const Database& database);
+
+  /// None, with a clause in `damage`, if they are missing, damaged or another place's.
+  std::optional<Features> read(std::int64_t place, const SessionFrame& at, Damage& damage);
+
+ private:
+  Statement row_;
+};
+
+/// Writes rows within whatever transaction there is. Throws Error (kind output).
+class RowWriter {
+ public:
+  explicit RowWriter(const Database& database);
+
+  /// A session that is there is given the new number of frames.
+  void write(const MapSession& session);
+  void write(const MapPlace& place, const Features& features);
+  void write(const MapLoop& loop);
+
+ private:
+  Statement session_;
+  Statement place_;
+  Statement features_;
+  Statement loop_;
+};
+
+/// The next free keys.
+int next_session(const Database& database);
+std::int64_t next_place(const Database& database);
+
+}  // namespace loopbit

@@ -1,0 +1,137 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "map_schema.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+namespace loopbit {
+namespace {
+
+/// Large pages: features take 48 KB a place, contents are read one after the other.
+constexpr int kPageBytes = 16384;
+
+struct Table {
+  const char* name;
+  const char* definition;  ///< as SQLite keeps it
+};
+
+constexpr std::array kTables{
+    Table{"session",
+          "CREATE TABLE session (session INTEGER PRIMARY KEY AUTOINCREMENT, uid TEXT NOT NULL, "
+          "name TEXT NOT NULL, started TEXT NOT NULL, loopbit TEXT NOT NULL, options TEXT NOT "
+          "NULL, frames INTEGER NOT NULL, checksum INTEGER NOT NULL)"},
+    Table{"place",
+          "CREATE TABLE place (place INTEGER PRIMARY KEY AUTOINCREMENT, session INTEGER NOT NULL, "
+          "frame INTEGER NOT NULL, timestamp REAL, content BLOB NOT NULL, checksum INTEGER NOT "
+          "NULL)"},
+    Table{"features",
+          "CREATE TABLE features (place INTEGER PRIMARY KEY, features BLOB NOT NULL, checksum "
+          "INTEGER NOT NULL)"},
+    Table{"loop",
+          "CREATE TABLE loop (loop INTEGER PRIMARY KEY, session INTEGER NOT NULL, frame INTEGER "
+          "NOT NULL, match_session INTEGER NOT NULL, match_frame INTEGER NOT NULL, score REAL NOT "
+          "NULL, similarity REAL NOT NULL, matches INTEGER NOT NULL, inliers INTEGER NOT NULL, "
+          "checksum INTEGER NOT NULL)"}};
+
+void create_tables(const Database& database) {
+  for (const Table& table : kTables) database.execute(table.definition);
+}
+
+/// Number i takes a map from version i to version i + 1; an empty file has version 0.
+using Migration = void (*)(const Database&);
+constexpr std::array<Migration, kMapVersion> kMigrations{create_tables};
+
+Database::Remedies remedies() {
+  return {.write =
+              "check the free space and the permissions of its folder, then run again with the "
+              "same map: what was saved before is kept",
+          .read =
+              "it is missing, damaged or no map of loopbit's; 'loopbit map check' says what is "
+              "left of a damaged one"};
+}
+
+[[noreturn]] void refuse(const Database& database, const std::string& why) {
+  throw Error(ErrorKind::input, fmt::format("'{}' {}.", database.path(), why));
+}
+
+/// A map has the tables of its version and no others: no view or trigger of a stranger is run.
+void check_tables(const Database& database) {
+  Statement rows(database, "SELECT name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite_%'");
+  std::size_t known = 0;
+  while (rows.step()) {
+    const std::string name = rows.text(0);
+    const std::string sql = rows.text(1);
+    const auto is_this = [&](const Table& table) {
+      return name == table.name && sql == table.definition;
+    };
+    if (std::none_of(kTables.begin(), kTables.end(), is_this)) {
+      refuse(database, fmt::format("has a table '{}' that no map of version {} has: it was changed "
+                                   "by something else; use a copy from before",
+                                   name, kMapVersion));
+    }
+    ++known;
+  }
+  if (known != kTables.size()) refuse(database, "lacks tables of a map: use a copy from before");
+}
+
+/// The version of the map; 0 for an empty file.
+int checked_version(const Database& database) {
+  const auto id = database.integer("PRAGMA application_id");
+  const auto version = database.integer("PRAGMA user_version");
+  if (id == 0 && version == 0 && database.integer("SELECT count(*) FROM sqlite_schema") == 0) {
+    return 0;
+  }
+  if (id != kMapApplicationId) {
+    refuse(database, "is a SQLite file, but no map of loopbit's; name another file");
+  }
+  if (version > kMapVersion || version < 1) {
+    refuse(database, fmt::format("is a map of version {}, but this loopbit knows versions up to "
+                                 "{}; use a newer loopbit",
+                                 version, kMapVersion));
+  }
+  return static_cast<int>(version);
+}
+
+void migrate(const Database& database, int version) {
+  if (version == kMapVersion) return;
+  database.execute("BEGIN IMMEDIATE");
+  for (auto i = static_cast<std::size_t>(version); i < kMigrations.size(); ++i) {
+    kMigrations[i](database);
+  }
+  database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}; COMMIT",
+                               kMapApplicationId, kMapVersion));
+}
+
+}  // namespace
+
+Database open_map_for_writing(const std::string& path) {
+  Database database(path, Database::Access::create, remedies());
+  database.execute(fmt::format("PRAGMA page_size = {}", kPageBytes));
+  migrate(database, checked_version(database));
+  check_tables(database);
+  // Each commit is on disk when it returns (sqlite.org/wal.html, "Performance Considerations").
+  database.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+  return database;
+}
+
+Database open_map_for_reading(const std::string& path) {
+  if (!std::filesystem::is_regular_file(path)) {
+    throw Error(
+        ErrorKind::input,
+        fmt::format("There is no map '{}'; 'loopbit run INPUT --map {}' makes one.", path, path));
+  }
+  Database database(path, Database::Access::read, remedies());
+  if (checked_version(database) == 0) {
+    refuse(database, "is empty; 'loopbit run INPUT --map' fills it");
+  }
+  check_tables(database);
+  return database;
+}
+
+}  // namespace loopbit

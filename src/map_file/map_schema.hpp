@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+
+#include "loopbit/database.hpp"
+
+namespace loopbit {
+
+/// "loop" in ASCII: what file(1) and SQLite tell a map by.
+inline constexpr int kMapApplicationId = 0x6c6f6f70;
+
+/// The version of the format that this library writes. It reads, after migration, all before.
+inline constexpr int kMapVersion = 1;
+
+/// Opens a map to be written, made if there is none or an empty file, and brought to kMapVersion.
+/// What is committed survives the loss of power. Throws Error (kind input) if the file is no map,
+/// of a newer version or damaged where its tables are listed, (kind output) if it cannot be
+/// written.
+Database open_map_for_writing(const std::string& path);
+
+/// Opens a map to be read, beside a writer or without. Throws as above, kind input.
+Database open_map_for_reading(const std::string& path);
+
+}  // namespace loopbit

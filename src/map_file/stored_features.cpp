@@ -1,0 +1,18 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "stored_features.hpp"
+
+#include <utility>
+
+namespace loopbit {
+
+std::shared_ptr<const Features> StoredFeatures::get(PlaceId place, Damage& damage) {
+  if (auto cached = cache_.find(place)) return cached;
+  const StoredPlace& stored = places_.at(static_cast<std::size_t>(place));
+  auto read = reader_.read(stored.id, stored.at, damage);
+  auto features = std::make_shared<const Features>(read ? std::move(*read) : Features{});
+  cache_.add(place, features);
+  return features;
+}
+
+}  // namespace loopbit

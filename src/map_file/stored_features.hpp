@@ -1,0 +1,49 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "loopbit/database.hpp"
+
+#include "feature_cache.hpp"
+#include "map_rows.hpp"
+
+namespace loopbit {
+
+/// The features of a map's places by the number a detector knows them by; those used last are kept,
+/// see kFeatureCacheBytes.
+class StoredFeatures {
+ public:
+  explicit StoredFeatures(const Database& database)
+      : reader_(database), cache_(kFeatureCacheBytes) {}
+
+  /// Gives the row `id`, a place of `at`, the next number.
+  void add(std::int64_t id, const SessionFrame& at) { places_.push_back({id, at}); }
+
+  [[nodiscard]] PlaceId size() const { return static_cast<PlaceId>(places_.size()); }
+
+  /// Null if they would have to be read.
+  std::shared_ptr<const Features> find(PlaceId place) { return cache_.find(place); }
+
+  /// Without any, and a clause in `damage`, if they are lost.
+  std::shared_ptr<const Features> get(PlaceId place, Damage& damage);
+
+  void keep(PlaceId place, std::shared_ptr<const Features> features) {
+    cache_.add(place, std::move(features));
+  }
+
+ private:
+  struct StoredPlace {
+    std::int64_t id = 0;
+    SessionFrame at;
+  };
+
+  FeatureReader reader_;
+  FeatureCache cache_;
+  std::vector<StoredPlace> places_;
+};
+
+}  // namespace loopbit

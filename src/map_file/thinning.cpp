@@ -1,0 +1,105 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "thinning.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <queue>
+#include <utility>
+
+#include "loopbit/place_index.hpp"
+
+namespace loopbit {
+namespace {
+
+constexpr std::size_t kNone = static_cast<std::size_t>(-1);
+
+class Thinning {
+ public:
+  explicit Thinning(const std::vector<ThinnedPlace>& places)
+      : places_(places), nodes_(places.size()) {
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const bool continues = i > 0 && places[i - 1].session == places[i].session;
+      if (!continues) continue;
+      nodes_[i].previous = i - 1;
+      nodes_[i - 1].next = i;
+    }
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      if (places[i].loop) nodes_[*places[i].loop].loops_to_it.push_back(i);
+    }
+    for (std::size_t i = 0; i < places.size(); ++i) assess(i);
+  }
+
+  std::vector<bool> kept(std::size_t max_places) {
+    std::size_t size = places_.size();
+    while (size > max_places && !cheapest_.empty()) {
+      const auto [cost, place] = cheapest_.top();
+      cheapest_.pop();
+      if (nodes_[place].removed || nodes_[place].cost != cost) continue;  // assessed anew since
+      remove(place);
+      --size;
+    }
+    std::vector<bool> kept(places_.size());
+    for (std::size_t i = 0; i < kept.size(); ++i) kept[i] = !nodes_[i].removed;
+    return kept;
+  }
+
+ private:
+  struct Node {
+    std::size_t previous = kNone;  ///< of those kept, in the session
+    std::size_t next = kNone;
+    std::size_t substitute = kNone;  ///< what stands for it
+    double cost = 0;
+    double owed = 0;  ///< the largest cost of those that it stands for
+    std::vector<std::size_t> loops_to_it;
+    bool removed = false;
+  };
+
+  /// Finds who stands for a place, and at what cost.
+  void assess(std::size_t i) {
+    Node& node = nodes_[i];
+    if (node.removed) return;
+    double best = -1.0;
+    for (const std::size_t other : {node.previous, node.next, places_[i].loop.value_or(kNone)}) {
+      if (other == kNone || nodes_[other].removed) continue;
+      const double xi = similarity(places_[i].content, places_[other].content,
+                                   RetrievalOptions{}.shift_tolerance_columns);
+      if (xi <= best) continue;
+      best = xi;
+      node.substitute = other;
+    }
+    constexpr double kIrreplaceable = 1e6;
+    node.cost = (best < 0 ? kIrreplaceable : 1.0 - best) + node.owed;
+    cheapest_.emplace(node.cost, i);
+  }
+
+  void remove(std::size_t i) {
+    Node& node = nodes_[i];
+    node.removed = true;
+    if (node.previous != kNone) nodes_[node.previous].next = node.next;
+    if (node.next != kNone) nodes_[node.next].previous = node.previous;
+    if (node.substitute != kNone && !nodes_[node.substitute].removed) {
+      Node& substitute = nodes_[node.substitute];
+      substitute.owed = std::max(substitute.owed, node.cost);
+      assess(node.substitute);
+    }
+    for (const std::size_t other : {node.previous, node.next}) {
+      if (other != kNone && other != node.substitute) assess(other);
+    }
+    for (const std::size_t other : node.loops_to_it) assess(other);
+  }
+
+  using Cost = std::pair<double, std::size_t>;
+
+  const std::vector<ThinnedPlace>& places_;
+  std::vector<Node> nodes_;
+  std::priority_queue<Cost, std::vector<Cost>, std::greater<>> cheapest_;
+};
+
+}  // namespace
+
+std::vector<bool> kept_places(const std::vector<ThinnedPlace>& places, std::size_t max_places) {
+  return Thinning(places).kept(max_places);
+}
+
+}  // namespace loopbit

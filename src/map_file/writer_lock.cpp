@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "writer_lock.hpp"
+
+#include <cerrno>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "loopbit/error.hpp"
+
+namespace loopbit {
+namespace {
+
+/// False if the file was removed, or replaced, after it was opened.
+bool is_still_at(const std::string& path, int file) {
+  struct stat opened {};
+  struct stat named {};
+  return fstat(file, &opened) == 0 && stat(path.c_str(), &named) == 0 &&
+         opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
+}
+
+}  // namespace
+
+WriterLock::WriterLock(const std::string& map_path) : path_(map_path + ".lock") {
+  constexpr mode_t kMode = 0666;  // less what umask takes
+  do {
+    if (file_ >= 0) close(file_);
+    file_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, kMode);
+    if (file_ < 0) throw cannot_write(path_, errno);
+    if (flock(file_, LOCK_EX | LOCK_NB) != 0) {
+      const int reason = errno;
+      close(file_);
+      if (reason != EWOULDBLOCK) throw cannot_write(path_, reason);
+      throw Error(ErrorKind::output,
+                  fmt::format("'{}' is being written by another run; wait until that ends, or name "
+                              "another map. Reading it is possible all the time.",
+                              map_path));
+    }
+  } while (!is_still_at(path_, file_));
+}
+
+WriterLock::~WriterLock() {
+  unlink(path_.c_str());
+  close(file_);
+}
+
+}  // namespace loopbit
