@@ -23,6 +23,8 @@ enum ExitCode : int {
 /// loopbit::Error.
 void add_run(CLI::App& app, int& exit_code);
 void add_demo(CLI::App& app, int& exit_code);
+void add_query(CLI::App& app, int& exit_code);
+void add_map(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_report(CLI::App& app);

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <csignal>
 #include <cstdio>
 #include <exception>
 
@@ -52,6 +53,8 @@ int run_command_line(int argc, char** argv) {
   int exit_code = cli::success;
   cli::add_run(app, exit_code);
   cli::add_demo(app, exit_code);
+  cli::add_query(app, exit_code);
+  cli::add_map(app, exit_code);
   cli::add_eval(app);
   cli::add_compare(app);
   cli::add_report(app);
@@ -71,6 +74,8 @@ int run_command_line(int argc, char** argv) {
 int main(int argc, char** argv) {
   // Bad images are reported by loopbit, in its own words.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  // Past a file size limit, let write() fail, which is reported as any full disk is.
+  std::signal(SIGXFSZ, SIG_IGN);
   try {
     return run_command_line(argc, argv);
   } catch (const loopbit::Error& error) {

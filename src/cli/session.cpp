@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <csignal>
 #include <filesystem>
 #include <thread>
 #include <utility>
@@ -24,28 +23,13 @@
 #include "commands.hpp"
 #include "progress.hpp"
 #include "run_list.hpp"
+#include "stop_signal.hpp"
 #include "summary.hpp"
 
 namespace loopbit::cli {
 namespace {
 
 constexpr std::size_t kFramesReadAhead = 8;
-
-std::atomic<bool> stop_requested{false};
-static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
-
-/// The first signal asks for an end in order; a second one ends the process.
-extern "C" void request_stop(int signal) {
-  stop_requested = true;
-  std::signal(signal, SIG_DFL);
-}
-
-void install_signal_handlers() {
-  std::signal(SIGINT, request_stop);
-  std::signal(SIGTERM, request_stop);
-  // Past a file size limit, let write() fail, which is reported as any full disk is.
-  std::signal(SIGXFSZ, SIG_IGN);
-}
 
 int thread_count(int wanted) {
   return wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
@@ -62,7 +46,8 @@ void check_readable(const std::vector<Detection>& detections, const std::string&
   }
 }
 
-void drive(ImageSource& source, LoopDetector& detector, RunFolder& folder, bool keep_evidence) {
+void drive(ImageSource& source, LoopDetector& detector, RunFolder& folder, bool keep_evidence,
+           const std::atomic<bool>& stop) {
   Progress progress(source.size());
   RunListener listener{[&](const Detection& detection) {
                          folder.add(detection);
@@ -77,7 +62,7 @@ void drive(ImageSource& source, LoopDetector& detector, RunFolder& folder, bool 
       evidence->add(detection.frame, image, seen);
     };
   }
-  run(source, detector, listener, stop_requested);
+  run(source, detector, listener, stop);
   if (evidence) evidence->finish();
 }
 
@@ -142,7 +127,7 @@ LoopDetectorOptions SessionFlags::detector_options() const {
 
 int run_session(Session session, const SessionFlags& flags) {
   using Clock = std::chrono::steady_clock;
-  install_signal_handlers();
+  const std::atomic<bool>& stop_requested = stop_on_signal();
   RunRecord record{.input = session.input,
                    .description = session.source->description(),
                    .options = flags.detector_options(),
@@ -171,7 +156,7 @@ int run_session(Session session, const SessionFlags& flags) {
     return std::chrono::duration<double>(Clock::now() - start).count();
   };
   try {
-    drive(*session.source, detector, folder, !flags.no_report);
+    drive(*session.source, detector, folder, !flags.no_report, stop_requested);
     if (map) map->finish();
     record.wall_s = elapsed_s();
     if (!stop_requested) check_readable(folder.detections(), session.input);

@@ -1,0 +1,223 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "loopbit/error.hpp"
+#include "loopbit/map_tools.hpp"
+#include "loopbit/write_file.hpp"
+
+#include "commands.hpp"
+#include "map_damage.hpp"
+
+namespace loopbit::cli {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string dump(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+}
+
+/// Of each session, how many places, or loops with a query in it, there are.
+using Counts = std::map<int, std::int64_t>;
+
+Counts places_of(MapReader& map) {
+  Counts counts;
+  map.for_each_place([&](const MapPlace& place) { ++counts[place.at.session]; });
+  return counts;
+}
+
+Counts loops_of(MapReader& map) {
+  Counts counts;
+  for (const MapLoop& loop : map.loops()) ++counts[loop.query.session];
+  return counts;
+}
+
+std::int64_t sum(const Counts& counts) {
+  std::int64_t sum = 0;
+  for (const auto& [session, count] : counts) sum += count;
+  return sum;
+}
+
+void info_command(const std::string& path, bool json) {
+  MapReader map(path);
+  const std::int64_t places = sum(places_of(map));
+  const std::int64_t loops = sum(loops_of(map));
+  const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(path));
+  if (json) {
+    Json info{{"path", path},     {"bytes", bytes}, {"sessions", map.sessions().size()},
+              {"places", places}, {"loops", loops}, {"options", nullptr}};
+    if (!map.sessions().empty()) info["options"] = Json::parse(to_json(map.options()));
+    fmt::print("{}\n", dump(info));
+  } else {
+    fmt::print("map        {}, {:.1f} MB", path, static_cast<double>(bytes) / 1e6);
+    if (places > 0)
+      fmt::print(", {:.1f} KB a place",
+                 static_cast<double>(bytes) / 1e3 / static_cast<double>(places));
+    fmt::print("\nsessions   {}\nplaces     {}\nloops      {}\n", map.sessions().size(), places,
+               loops);
+    for (const MapSession& session : map.sessions()) {
+      fmt::print("  {:>9} {} ({}, {} frames)\n", session.session, session.name, session.started,
+                 session.frames);
+    }
+  }
+  warn_of_damage(map);
+}
+
+void list_command(const std::string& path, bool json) {
+  MapReader map(path);
+  Counts places = places_of(map);
+  Counts loops = loops_of(map);
+  Json list = Json::array();
+  if (!json) {
+    fmt::print("{:>7}  {:<20}  {:>9}  {:>9}  {:>9}  {:<32}  {}\n", "session", "started", "frames",
+               "places", "loops", "uid", "name");
+  }
+  for (const MapSession& s : map.sessions()) {
+    if (json) {
+      list.push_back({{"session", s.session},
+                      {"name", s.name},
+                      {"started", s.started},
+                      {"frames", s.frames},
+                      {"places", places[s.session]},
+                      {"loops", loops[s.session]},
+                      {"uid", s.uid},
+                      {"loopbit", s.loopbit}});
+    } else {
+      fmt::print("{:>7}  {:<20}  {:>9}  {:>9}  {:>9}  {:<32}  {}\n", s.session, s.started, s.frames,
+                 places[s.session], loops[s.session], s.uid, s.name);
+    }
+  }
+  if (json) fmt::print("{}\n", dump(list));
+  warn_of_damage(map);
+}
+
+void merge_command(const std::string& into, const std::vector<std::string>& others) {
+  for (const std::string& other : others) {
+    const MergeCounts counts = merge_map(into, other);
+    fmt::print("merged     {}: {} sessions, {} places, {} loops", other, counts.sessions,
+               counts.places, counts.loops);
+    if (counts.known > 0) fmt::print("; {} sessions were there before", counts.known);
+    fmt::print("\n");
+  }
+}
+
+void export_command(const std::string& path, ExportFormat format, const std::string& out) {
+  MapReader map(path);
+  const std::string text = export_loops(map, format);
+  if (out.empty()) {
+    fmt::print("{}", text);
+  } else {
+    write_file(out, text);
+  }
+  warn_of_damage(map);
+}
+
+int check_command(const std::string& path, const std::string& recover) {
+  const MapCheck check = recover.empty() ? check_map(path) : recover_map(path, recover);
+  for (const std::string& clause : check.damage) fmt::print("damaged    {}\n", clause);
+  fmt::print("whole      {} sessions, {} places, {} loops\n", check.sessions, check.places,
+             check.loops);
+  if (!recover.empty()) {
+    fmt::print("written    {}\n", recover);
+    return success;
+  }
+  if (!check.damage.empty()) {
+    fmt::print("remedy     loopbit map check {} --recover NEW.db saves what is whole\n", path);
+  }
+  return check.damage.empty() ? success : bad_input;
+}
+
+void compact_command(const std::string& path, const CompactOptions& options) {
+  if (options.drop_sessions.empty() && options.max_places == 0) {
+    throw Error(ErrorKind::option,
+                "What is to be forgotten? Name sessions by --drop, a number of places by --budget, "
+                "or both.");
+  }
+  const CompactCounts counts = compact_map(path, options);
+  fmt::print("places     {} of {} kept\n", counts.places_after, counts.places_before);
+  fmt::print("size       {:.1f} MB, before {:.1f} MB\n",
+             static_cast<double>(counts.bytes_after) / 1e6,
+             static_cast<double>(counts.bytes_before) / 1e6);
+}
+
+struct MapFlags {
+  std::string map;
+  bool json = false;
+  std::vector<std::string> others;
+  ExportFormat format = ExportFormat::csv;
+  std::string out;
+  std::string recover;
+  CompactOptions compact;
+};
+
+using Flags = std::shared_ptr<MapFlags>;
+
+CLI::App* add_command(CLI::App& map, const Flags& flags, const char* name, const char* what) {
+  CLI::App* command = map.add_subcommand(name, what);
+  command->add_option("MAP", flags->map, "A map that 'loopbit run --map' made")->required();
+  return command;
+}
+
+void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
+  CLI::App* info = add_command(map, flags, "info", "Say what is in a map");
+  info->add_flag("--json", flags->json, "Print JSON");
+  info->callback([flags] { info_command(flags->map, flags->json); });
+
+  CLI::App* list = add_command(map, flags, "list", "List the sessions of a map");
+  list->add_flag("--json", flags->json, "Print JSON");
+  list->callback([flags] { list_command(flags->map, flags->json); });
+
+  CLI::App* export_loops = add_command(map, flags, "export", "Write the loops as edges of a graph");
+  const std::map<std::string, ExportFormat> formats{
+      {"csv", ExportFormat::csv}, {"json", ExportFormat::json}, {"g2o", ExportFormat::g2o}};
+  export_loops->add_option("--format", flags->format, "csv (default), json or g2o")
+      ->type_name("FORMAT")
+      ->transform(CLI::CheckedTransformer(formats));
+  export_loops->add_option("--out", flags->out, "The file to write; default: standard output")
+      ->type_name("FILE");
+  export_loops->callback([flags] { export_command(flags->map, flags->format, flags->out); });
+
+  CLI::App* check = add_command(map, flags, "check", "Read every byte, and say what is damaged");
+  check->add_option("--recover", flags->recover, "Copy what is whole to a new map")
+      ->type_name("NEW.db");
+  check->callback([flags, &exit_code] { exit_code = check_command(flags->map, flags->recover); });
+}
+
+void add_writers(CLI::App& map, const Flags& flags) {
+  CLI::App* merge = add_command(map, flags, "merge", "Add the sessions of other maps to a map");
+  merge->add_option("OTHER", flags->others, "Maps to add; sessions that MAP has are left out")
+      ->required();
+  merge->callback([flags] { merge_command(flags->map, flags->others); });
+
+  CLI::App* compact = add_command(map, flags, "compact", "Forget sessions or redundant places");
+  compact
+      ->add_option("--drop", flags->compact.drop_sessions, "A session to forget; may be repeated")
+      ->type_name("SESSION")
+      ->allow_extra_args(false);
+  compact
+      ->add_option("--budget", flags->compact.max_places,
+                   "Keep at most so many places, those that others stand for least")
+      ->type_name("PLACES")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{2'000'000'000}));
+  compact->callback([flags] { compact_command(flags->map, flags->compact); });
+}
+
+}  // namespace
+
+void add_map(CLI::App& app, int& exit_code) {
+  auto flags = std::make_shared<MapFlags>();
+  CLI::App* map = app.add_subcommand("map", "Look into maps, check, merge and shrink them");
+  map->require_subcommand(1);
+  add_readers(*map, flags, exit_code);
+  add_writers(*map, flags);
+}
+
+}  // namespace loopbit::cli

@@ -1,0 +1,171 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "loopbit/error.hpp"
+#include "loopbit/folder_watch.hpp"
+#include "loopbit/image_source.hpp"
+#include "loopbit/loop_detector.hpp"
+#include "loopbit/map_file.hpp"
+
+#include "commands.hpp"
+#include "map_damage.hpp"
+#include "stop_signal.hpp"
+
+namespace loopbit::cli {
+namespace {
+
+constexpr std::chrono::milliseconds kWatchPause{50};
+
+struct QueryFlags {
+  std::string map;
+  std::vector<std::string> images;
+  std::string watch;
+  std::size_t places = 3;
+  std::vector<std::string> settings;
+  bool json = false;
+};
+
+LoopDetectorOptions detector_options(const MapReader& map, const QueryFlags& flags) {
+  LoopDetectorOptions options = map.options();
+  for (const std::string& setting : flags.settings) {
+    const auto [name, value] = split_setting(setting);
+    if (name.starts_with("binary_content.") || name.starts_with("surf.")) {
+      throw Error(ErrorKind::option,
+                  fmt::format("{} is what '{}' was made with, and cannot be changed; make another "
+                              "map with 'loopbit run --map'.",
+                              name, flags.map));
+    }
+    set_option(options, name, value);
+  }
+  validate(options);
+  return options;
+}
+
+void print_row(const std::string& image, std::string_view status, const RankedPlace& place) {
+  fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7.1f}  {:>10.3f}  {:>7}\n", image, status,
+             place.place.session, place.place.frame, place.score, place.similarity, place.inliers);
+}
+
+void print_table(const std::string& image, Status status, const std::vector<RankedPlace>& places) {
+  if (places.empty()) fmt::print("{:<24}  {}\n", image, to_string(status));
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    print_row(i == 0 ? image : "", i == 0 ? to_string(status) : "", places[i]);
+  }
+}
+
+/// One line an image, so that a program can read them as they come.
+void print_json(const std::string& image, Status status, const std::vector<RankedPlace>& places) {
+  using Json = nlohmann::ordered_json;
+  Json json{{"image", image}, {"status", to_string(status)}, {"places", Json::array()}};
+  for (const RankedPlace& place : places) {
+    json["places"].push_back({{"session", place.place.session},
+                              {"frame", place.place.frame},
+                              {"score", place.score},
+                              {"similarity", place.similarity},
+                              {"matches", place.matches},
+                              {"inliers", place.inliers}});
+  }
+  fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+/// Asks a map about images, and prints its answers.
+class Relocalizer {
+ public:
+  explicit Relocalizer(const QueryFlags& flags)
+      : flags_(flags),
+        map_(std::make_shared<MapReader>(flags.map)),
+        detector_(detector_options(*map_, flags), map_) {
+    if (!flags.json) {
+      fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7}  {:>10}  {:>7}\n", "image", "status",
+                 "session", "frame", "score", "similarity", "inliers");
+    }
+  }
+
+  /// All images of `input`.
+  void ask(const std::string& input) {
+    const auto source = open_source(input);
+    for (Frame frame; source->next(frame);) answer(frame);
+    std::fflush(stdout);
+  }
+
+  [[nodiscard]] bool any_readable() const { return any_readable_; }
+  [[nodiscard]] const MapReader& map() const { return *map_; }
+
+ private:
+  void answer(const Frame& frame) {
+    std::vector<RankedPlace> places;
+    Status status = Status::unreadable;
+    try {
+      if (!frame.error.empty()) throw Error(ErrorKind::input, frame.error);
+      status = detector_.query(frame.image, std::nullopt, &places).status;
+      any_readable_ = true;
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::input) throw;
+      fmt::print(stderr, "loopbit: '{}': {}\n", frame.name, error.what());
+    }
+    if (places.size() > flags_.places) places.resize(flags_.places);
+    (flags_.json ? print_json : print_table)(frame.name, status, places);
+  }
+
+  const QueryFlags& flags_;
+  std::shared_ptr<MapReader> map_;
+  LoopDetector detector_;
+  bool any_readable_ = false;
+};
+
+int query_command(const QueryFlags& flags) {
+  if (flags.images.empty() == flags.watch.empty()) {
+    throw Error(ErrorKind::option,
+                "Which images? Name some, or a folder by --watch, but not both.");
+  }
+  Relocalizer relocalizer(flags);
+  for (const std::string& image : flags.images) relocalizer.ask(image);
+  if (!flags.watch.empty()) {
+    const auto& stop = stop_on_signal();
+    FolderWatch watch(flags.watch);
+    while (!stop) {
+      for (const std::string& image : watch.arrived()) relocalizer.ask(image);
+      std::this_thread::sleep_for(kWatchPause);
+    }
+  }
+  warn_of_damage(relocalizer.map());
+  return flags.images.empty() || relocalizer.any_readable() ? success : bad_input;
+}
+
+}  // namespace
+
+void add_query(CLI::App& app, int& exit_code) {
+  auto flags = std::make_shared<QueryFlags>();
+  CLI::App* command =
+      app.add_subcommand("query", "Ask a map which of its places single images show");
+  command->add_option("MAP", flags->map, "A map that 'loopbit run --map' made")->required();
+  command->add_option("IMAGE", flags->images,
+                      "Images, or anything else that 'loopbit run' takes; each is asked about on "
+                      "its own");
+  command
+      ->add_option("--watch", flags->watch,
+                   "Ask about each image in a folder, and about those to come, until Ctrl-C")
+      ->type_name("DIR");
+  command->add_option("--places", flags->places, "Show so many places an image, best first")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  command->add_flag("--json", flags->json, "Print a JSON object an image, one a line");
+  command
+      ->add_option("--set", flags->settings,
+                   "One setting of retrieval, verification or decision; may be repeated")
+      ->type_name("NAME=VALUE")
+      ->allow_extra_args(false);
+  command->callback([flags, &exit_code] { exit_code = query_command(*flags); });
+}
+
+}  // namespace loopbit::cli

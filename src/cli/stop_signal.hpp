@@ -1,0 +1,12 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <atomic>
+
+namespace loopbit::cli {
+
+/// From now on, a first SIGINT or SIGTERM turns the result true; a second one ends the process.
+const std::atomic<bool>& stop_on_signal();
+
+}  // namespace loopbit::cli

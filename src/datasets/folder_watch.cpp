@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/folder_watch.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+#include "image_file.hpp"
+#include "natural_order.hpp"
+
+namespace loopbit {
+
+namespace fs = std::filesystem;
+
+FolderWatch::FolderWatch(const std::string& folder) : folder_(folder) {
+  if (!fs::is_directory(folder)) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' is no folder; name one that images come to.", folder));
+  }
+}
+
+std::vector<std::string> FolderWatch::arrived() {
+  std::error_code error;
+  fs::directory_iterator entry(folder_, error);
+  std::vector<std::string> names;
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with('.') || !datasets::is_image_name(name)) continue;
+    std::error_code vanished;
+    const std::uintmax_t bytes = fs::file_size(entry->path(), vanished);
+    if (vanished) continue;
+    const auto [found, is_new] = files_.try_emplace(name);
+    File& file = found->second;
+    const bool settled = !is_new && bytes > 0 && file.bytes == bytes;
+    file.bytes = bytes;
+    if (file.given || !settled) continue;
+    file.given = true;
+    names.push_back(name);
+  }
+  if (error) {
+    throw Error(ErrorKind::input,
+                fmt::format("The folder '{}' cannot be read any more ({}); check that it is there.",
+                            folder_, error.message()));
+  }
+  std::sort(names.begin(), names.end(), datasets::natural_less);
+  for (std::string& name : names) name = (fs::path(folder_) / name).string();
+  return names;
+}
+
+}  // namespace loopbit
