@@ -62,7 +62,7 @@ MapReader::MapReader(const std::string& path) : impl_(std::make_unique<Impl>(pat
 MapReader::~MapReader() = default;
 
 const std::vector<MapSession>& MapReader::sessions() const { return impl_->sessions; }
-const std::vector<std::string>& MapReader::damage() const { return impl_->damage; }
+const std::vector<std::string>& MapReader::damage() const { return impl_->damage.clauses(); }
 const std::string& MapReader::path() const { return impl_->path; }
 
 LoopDetectorOptions MapReader::options() const {
@@ -134,11 +134,11 @@ class MapWriter::Impl {
           visit(place.at, place.content);
         },
         damage_);
-    if (damage_.empty()) return;
+    if (damage_.clauses().empty()) return;
     throw Error(ErrorKind::input,
                 fmt::format("'{0}' is damaged ({1}) and not written to; 'loopbit map check {0} "
                             "--recover NEW.db' saves the rest in a new map.",
-                            database_->path(), with_more(damage_)));
+                            database_->path(), with_more(damage_.clauses())));
   }
 
   std::shared_ptr<const Features> features(PlaceId place) {

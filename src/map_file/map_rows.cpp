@@ -12,9 +12,11 @@
 namespace loopbit {
 namespace {
 
-/// Behind a page that cannot be read, so many keys are tried in turn for the next one that can. A
-/// damaged page of contents holds 29 rows, one of the pages above it some 50,000.
-constexpr std::int64_t kMaxProbes = 200'000;
+/// Behind a page that cannot be read, so many keys are tried for the next one that can: a thousand
+/// in turn, then in growing steps, 200,000 keys in all. A damaged page of contents holds 29 rows,
+/// one of the pages above it some 50,000.
+constexpr std::int64_t kMaxProbes = 20'000;
+constexpr std::int64_t kProbesPerStep = 1000;
 
 /// Calls visit(row, key) for each row of `table` that can be read, in order of its key, which is
 /// the first of `columns`.
@@ -34,8 +36,8 @@ void for_each_row(const Database& database, const std::string& table, const std:
       const std::int64_t at = rows.integer(0);
       if (at < next || at == std::numeric_limits<std::int64_t>::max()) break;  // out of order
       if (damaged_from > 0) {
-        damage.push_back(fmt::format("{} {} to {}: a page of the file cannot be read", table,
-                                     damaged_from, at - 1));
+        damage.add(fmt::format("{} {} to {}: a page of the file cannot be read", table,
+                               damaged_from, at - 1));
         damaged_from = 0;
       }
       visit(rows, at);
@@ -46,10 +48,10 @@ void for_each_row(const Database& database, const std::string& table, const std:
       break;
     }
     if (damaged_from == 0) damaged_from = next;
-    ++next;
+    next += 1 + probes / kProbesPerStep;
     ++probes;
   }
-  damage.push_back(fmt::format("{} {} and after: the file cannot be read", table, damaged_from));
+  damage.add(fmt::format("{} {} and after: the file cannot be read", table, damaged_from));
 }
 
 bool has_checksum(const Statement& row, int column, const Checksum& checksum) {
@@ -100,65 +102,62 @@ SessionFrame session_frame(const Statement& row, int column) {
 
 std::vector<MapSession> read_sessions(const Database& database, Damage& damage) {
   std::vector<MapSession> sessions;
-  for_each_row(database, "session",
-               "session, uid, name, started, loopbit, options, frames, checksum", damage,
-               [&](const Statement& row, std::int64_t key) {
-                 MapSession session{.session = narrow(key),
-                                    .uid = row.text(1),
-                                    .name = row.text(2),
-                                    .started = row.text(3),
-                                    .loopbit = row.text(4),
-                                    .options = row.text(5),
-                                    .frames = row.integer(6)};
-                 if (has_checksum(row, 7, checksum_of(session))) {
-                   sessions.push_back(std::move(session));
-                 } else {
-                   damage.push_back(
-                       fmt::format("session {}: its description differs from its checksum", key));
-                 }
-               });
+  for_each_row(
+      database, "session", "session, uid, name, started, loopbit, options, frames, checksum",
+      damage, [&](const Statement& row, std::int64_t key) {
+        MapSession session{.session = narrow(key),
+                           .uid = row.text(1),
+                           .name = row.text(2),
+                           .started = row.text(3),
+                           .loopbit = row.text(4),
+                           .options = row.text(5),
+                           .frames = row.integer(6)};
+        if (has_checksum(row, 7, checksum_of(session))) {
+          sessions.push_back(std::move(session));
+        } else {
+          damage.add(fmt::format("session {}: its description differs from its checksum", key));
+        }
+      });
   return sessions;
 }
 
 void for_each_place(const Database& database, const std::function<void(const MapPlace&)>& visit,
                     Damage& damage) {
   MapPlace place;
-  for_each_row(
-      database, "place", "place, session, frame, timestamp, content, checksum", damage,
-      [&](const Statement& row, std::int64_t key) {
-        place.id = key;
-        place.at = session_frame(row, 1);
-        place.timestamp_s.reset();
-        if (!row.is_null(3)) place.timestamp_s = row.real(3);
-        const auto content = content_from(row.bytes(4));
-        if (content) place.content = *content;
-        if (content && has_checksum(row, 5, checksum_of(place))) {
-          visit(place);
-        } else {
-          damage.push_back(fmt::format("place {}: its content differs from its checksum", key));
-        }
-      });
+  for_each_row(database, "place", "place, session, frame, timestamp, content, checksum", damage,
+               [&](const Statement& row, std::int64_t key) {
+                 place.id = key;
+                 place.at = session_frame(row, 1);
+                 place.timestamp_s.reset();
+                 if (!row.is_null(3)) place.timestamp_s = row.real(3);
+                 const auto content = content_from(row.bytes(4));
+                 if (content) place.content = *content;
+                 if (content && has_checksum(row, 5, checksum_of(place))) {
+                   visit(place);
+                 } else {
+                   damage.add(fmt::format("place {}: its content differs from its checksum", key));
+                 }
+               });
 }
 
 std::vector<MapLoop> read_loops(const Database& database, Damage& damage) {
   std::vector<MapLoop> loops;
-  for_each_row(
-      database, "loop",
-      "loop, session, frame, match_session, match_frame, score, similarity, matches, "
-      "inliers, checksum",
-      damage, [&](const Statement& row, std::int64_t key) {
-        const MapLoop loop{.query = session_frame(row, 1),
-                           .match = session_frame(row, 3),
-                           .score = row.real(5),
-                           .similarity = row.real(6),
-                           .matches = narrow(row.integer(7)),
-                           .inliers = narrow(row.integer(8))};
-        if (has_checksum(row, 9, checksum_of(loop))) {
-          loops.push_back(loop);
-        } else {
-          damage.push_back(fmt::format("loop {}: its values differ from their checksum", key));
-        }
-      });
+  for_each_row(database, "loop",
+               "loop, session, frame, match_session, match_frame, score, similarity, matches, "
+               "inliers, checksum",
+               damage, [&](const Statement& row, std::int64_t key) {
+                 const MapLoop loop{.query = session_frame(row, 1),
+                                    .match = session_frame(row, 3),
+                                    .score = row.real(5),
+                                    .similarity = row.real(6),
+                                    .matches = narrow(row.integer(7)),
+                                    .inliers = narrow(row.integer(8))};
+                 if (has_checksum(row, 9, checksum_of(loop))) {
+                   loops.push_back(loop);
+                 } else {
+                   damage.add(fmt::format("loop {}: its values differ from their checksum", key));
+                 }
+               });
   return loops;
 }
 
@@ -176,7 +175,7 @@ std::optional<Features> FeatureReader::read(std::int64_t place, const SessionFra
   }
   row_.reset();  // ends the read, so that the log can be emptied
   if (!features) {
-    damage.push_back(
+    damage.add(
         fmt::format("place {} (session {}, frame {}): its features are missing or "
                     "differ from their checksum",
                     place, at.session, at.frame));

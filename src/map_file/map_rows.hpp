@@ -6,6 +6,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <unordered_set>
 #include <vector>
 
 #include "loopbit/database.hpp"
@@ -16,7 +17,19 @@ namespace loopbit {
 // The rows of a map, each with a checksum over its key and values, so that no damage passes for
 // data. Readers leave out what is damaged, and say so in `damage`, a clause a row or page.
 
-using Damage = std::vector<std::string>;
+/// What was found damaged, each thing once.
+class Damage {
+ public:
+  void add(const std::string& clause) {
+    if (known_.insert(clause).second) clauses_.push_back(clause);
+  }
+
+  [[nodiscard]] const std::vector<std::string>& clauses() const { return clauses_; }
+
+ private:
+  std::vector<std::string> clauses_;
+  std::unordered_set<std::string> known_;
+};
 
 std::vector<MapSession> read_sessions(const Database& database, Damage& damage);
 

@@ -1,0 +1,220 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/map_file.hpp"
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "loopbit/loop_detector.hpp"
+#include "loopbit/map_tools.hpp"
+
+#include "map_support.hpp"
+#include "test_support.hpp"
+
+namespace loopbit::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class MapFile : public ScratchTest {
+ protected:
+  std::string map_path_;
+  void SetUp() override {
+    ScratchTest::SetUp();
+    map_path_ = path("map.db");
+  }
+};
+
+TEST_F(MapFile, GivesBackWhatWasAdded) {
+  add_session(map_path_, 40);
+  MapReader map(map_path_);
+  const auto places = places_of(map);
+  ASSERT_EQ(places.size(), 40U);
+  EXPECT_EQ(places[7].at, (SessionFrame{1, 7}));
+  expect_only_true_places(map);
+  for (const MapPlace& place : places) EXPECT_TRUE(map.features_of(place).has_value());
+  ASSERT_EQ(map.sessions().size(), 1U);
+  EXPECT_EQ(map.sessions()[0].name, "drive");
+  EXPECT_EQ(map.sessions()[0].frames, 40);
+  EXPECT_EQ(map.sessions()[0].uid.size(), 32U);
+  EXPECT_EQ(to_json(map.options()), to_json(fast_options()));
+  EXPECT_TRUE(map.damage().empty());
+  EXPECT_TRUE(map.check_structure().empty());
+}
+
+TEST_F(MapFile, KeepsSessionsAndLoopsApart) {
+  add_session(map_path_, 5, "first");
+  add_session(map_path_, 6, "second", SessionFrame{1, 4});
+  MapReader map(map_path_);
+  EXPECT_EQ(places_of(map).back().at, (SessionFrame{2, 5}));
+  const MapLoop loop{{2, 5}, {1, 4}, 30.5, 0.25, 40, 31};
+  EXPECT_EQ(map.loops(), std::vector<MapLoop>{loop});
+  EXPECT_NE(map.sessions()[0].uid, map.sessions()[1].uid);
+}
+
+TEST_F(MapFile, ASessionWithoutFramesLeavesNoTrace) {
+  { const MapWriter map(map_path_, fast_options(), "nothing"); }
+  EXPECT_TRUE(MapReader(map_path_).sessions().empty());
+  add_session(map_path_, 1);
+  EXPECT_EQ(MapReader(map_path_).sessions()[0].session, 1);
+}
+
+TEST_F(MapFile, UnreadableFramesAreNoPlaces) {
+  {
+    MapWriter map(map_path_, fast_options(), "drive");
+    add_frame(map, 0);
+    map.add({.frame = 1, .status = Status::unreadable}, {}, std::make_shared<const Features>());
+    add_frame(map, 2);
+  }
+  MapReader map(map_path_);
+  const auto places = places_of(map);
+  ASSERT_EQ(places.size(), 2U);
+  EXPECT_EQ(places[1].at, (SessionFrame{1, 2}));
+  EXPECT_EQ(map.sessions()[0].frames, 3);
+}
+
+TEST_F(MapFile, SavedFramesAreSeenByReadersBesideTheWriter) {
+  MapWriter map(map_path_, fast_options(), "drive");
+  for (int frame = 0; frame < 10; ++frame) add_frame(map, frame);
+  map.flush();
+  EXPECT_EQ(map.saved_frames(), 10);
+  MapReader reader(map_path_);
+  EXPECT_EQ(places_of(reader).size(), 10U);
+  for (int frame = 10; frame < 100; ++frame) add_frame(map, frame);
+  map.flush();
+  EXPECT_EQ(places_of(reader).size(), 100U);
+  expect_only_true_places(reader);
+  map.finish();
+  EXPECT_EQ(places_of(reader).size(), 100U);
+}
+
+TEST_F(MapFile, AWriterGivesTheFeaturesOfPlacesSavedAndPending) {
+  add_session(map_path_, 3);
+  MapWriter map(map_path_, fast_options(), "drive");
+  int earlier = 0;
+  map.for_each_earlier_place([&](const SessionFrame&, const BinaryContent&) { ++earlier; });
+  EXPECT_EQ(earlier, 3);
+  add_frame(map, 0);
+  EXPECT_TRUE(same_features(*map.features(3), few_features(0)));
+  map.flush();
+  EXPECT_TRUE(same_features(*map.features(3), few_features(0)));
+  EXPECT_TRUE(same_features(*map.features(2), few_features(2)));
+}
+
+TEST_F(MapFile, ASecondWriterIsRefusedUntilTheFirstEnds) {
+  {
+    MapWriter first(map_path_, fast_options(), "first");
+    add_frame(first, 0);
+    expect_error(ErrorKind::output, {map_path_, "being written"},
+                 [&] { const MapWriter second(map_path_, fast_options(), "second"); });
+    expect_error(ErrorKind::output, {"being written"}, [&] { compact_map(map_path_, {{1}, 0}); });
+  }
+  const MapWriter second(map_path_, fast_options(), "second");
+  EXPECT_EQ(second.session(), 2);
+}
+
+TEST_F(MapFile, AMapMadeWithOtherSettingsIsRefused) {
+  add_session(map_path_, 1);
+  LoopDetectorOptions options = fast_options();
+  options.decision.min_score = 99;  // shapes no place
+  { const MapWriter map(map_path_, options, "drive"); }
+  options.surf.max_keypoints = 200;
+  expect_error(ErrorKind::option,
+               {map_path_, "surf.max_keypoints = 300", "has 200", "--set surf.max_keypoints=300"},
+               [&] { const MapWriter map(map_path_, options, "drive"); });
+}
+
+TEST_F(MapFile, OtherFilesAreRefused) {
+  add_session(map_path_, 1);
+  expect_error(ErrorKind::input, {path("none.db"), "loopbit run"},
+               [&] { const MapReader map(path("none.db")); });
+  const std::string text = write("text.db", std::string(100'000, 'x'));
+  expect_error(ErrorKind::input, {text, "no map"}, [&] { const MapReader map(text); });
+  expect_error(ErrorKind::input, {text}, [&] { const MapWriter map(text, fast_options(), ""); });
+  const std::string empty = write("empty.db", "");
+  expect_error(ErrorKind::input, {empty, "empty"}, [&] { const MapReader map(empty); });
+  change(path("other.db"), "CREATE TABLE place (place INTEGER PRIMARY KEY)");
+  expect_error(ErrorKind::input, {"no map of loopbit's"},
+               [&] { const MapReader map(path("other.db")); });
+}
+
+TEST_F(MapFile, ANewerVersionIsRefused) {
+  add_session(map_path_, 1);
+  change(map_path_, "PRAGMA user_version = 2");
+  const auto words = {std::string_view("version 2"), std::string_view("newer loopbit")};
+  expect_error(ErrorKind::input, words, [&] { const MapReader map(map_path_); });
+  expect_error(ErrorKind::input, words,
+               [&] { const MapWriter map(map_path_, fast_options(), "drive"); });
+}
+
+TEST_F(MapFile, StrangeTablesAreRefused) {
+  for (const char* sql :
+       {"CREATE TABLE stranger (x)", "CREATE VIEW stranger AS SELECT * FROM place",
+        "CREATE TRIGGER stranger AFTER INSERT ON place BEGIN DELETE FROM place; END"}) {
+    const std::string copy = path("copy.db");
+    fs::remove(copy);
+    add_session(copy, 1);
+    change(copy, sql);
+    expect_error(ErrorKind::input, {copy, "'stranger'"}, [&] { const MapReader map(copy); });
+  }
+  add_session(map_path_, 1);
+  change(map_path_, "DROP TABLE loop");
+  expect_error(ErrorKind::input, {"lacks"}, [&] { const MapReader map(map_path_); });
+}
+
+/// Any value changed by hand: its row is left out, all others are there.
+TEST_F(MapFile, ChangedRowsAreLeftOut) {
+  add_session(map_path_, 3, "first");
+  add_session(map_path_, 3, "second", SessionFrame{1, 1});
+  const auto expect_damage = [&](const std::string& sql, std::size_t places, std::size_t sessions,
+                                 std::size_t loops) {
+    const std::string copy = path("copy.db");
+    fs::copy_file(map_path_, copy, fs::copy_options::overwrite_existing);
+    change(copy, sql);
+    MapReader map(copy);
+    EXPECT_EQ(places_of(map).size(), places) << sql;
+    EXPECT_EQ(map.sessions().size(), sessions) << sql;
+    EXPECT_EQ(map.loops().size(), loops) << sql;
+    expect_only_true_places(map);
+    EXPECT_EQ(map.damage().size(), 1U) << sql;
+    EXPECT_EQ(check_map(copy).damage.empty(), false) << sql;
+  };
+  expect_damage("UPDATE place SET frame = 2 WHERE place = 2", 5, 2, 1);
+  expect_damage("UPDATE place SET session = 2 WHERE place = 2", 5, 2, 1);
+  expect_damage("UPDATE place SET timestamp = NULL WHERE place = 2", 5, 2, 1);
+  expect_damage("UPDATE place SET content = zeroblob(512) WHERE place = 2", 5, 2, 1);
+  expect_damage("UPDATE place SET content = 'short' WHERE place = 2", 5, 2, 1);
+  expect_damage("UPDATE features SET features = zeroblob(16) WHERE place = 2", 6, 2, 1);
+  expect_damage("DELETE FROM features WHERE place = 2", 6, 2, 1);
+  expect_damage("UPDATE session SET name = 'changed' WHERE session = 1", 6, 1, 1);
+  expect_damage("UPDATE session SET frames = -1 WHERE session = 1", 6, 1, 1);
+  expect_damage("UPDATE loop SET match_frame = 2", 6, 2, 0);
+}
+
+TEST_F(MapFile, ADamagedMapIsNotWrittenToButRecovered) {
+  add_session(map_path_, 3, "first");
+  add_session(map_path_, 3, "second", SessionFrame{1, 1});
+  change(map_path_,
+         "UPDATE place SET frame = 7 WHERE place = 2; DELETE FROM session WHERE session "
+         "= 2");
+  MapWriter map(map_path_, fast_options(), "third");
+  expect_error(ErrorKind::input, {map_path_, "place 2", "--recover"}, [&] {
+    const LoopDetector detector(fast_options(), {&map, [](auto*) {}});
+  });
+  const MapCheck check = recover_map(map_path_, path("new.db"));
+  EXPECT_EQ(check.places, 5);
+  EXPECT_EQ(check.sessions, 2);
+  EXPECT_EQ(check.loops, 1);
+  MapReader recovered(path("new.db"));
+  EXPECT_TRUE(check_map(path("new.db")).damage.empty());
+  EXPECT_EQ(recovered.sessions()[1].name, "recovered");
+  EXPECT_EQ(recovered.sessions()[1].frames, 3);
+  expect_only_true_places(recovered);
+  expect_error(ErrorKind::output, {path("new.db"), "exists"},
+               [&] { recover_map(map_path_, path("new.db")); });
+}
+
+}  // namespace
+}  // namespace loopbit::test

@@ -1,0 +1,144 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+// A detector with a map: sessions, and what may not depend on there being one.
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "loopbit/loop_detector.hpp"
+
+#include "map_support.hpp"
+#include "test_support.hpp"
+
+namespace loopbit::test {
+namespace {
+
+constexpr int kLap = 24;
+
+class MapSession : public ScratchTest {
+ protected:
+  /// Passes the places first to last, seen from `moved_px` beside, in a session of its own.
+  std::vector<Detection> drive(int first, int last, cv::Point moved_px = {0, 0}) {
+    const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+    LoopDetector detector(fast_options(), map);
+    std::vector<Detection> detections;
+    for (int place = first; place <= last; ++place) {
+      detections.push_back(detector.process(view(place, moved_px)));
+    }
+    map->finish();
+    return detections;
+  }
+};
+
+TEST_F(MapSession, AMapChangesNothingWithinASession) {
+  const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+  LoopDetector with(fast_options(), map);
+  LoopDetector without(fast_options());
+  int loops = 0;
+  for (int frame = 0; frame < 2 * kLap; ++frame) {
+    const cv::Mat1b image = view(frame % kLap, {frame < kLap ? 0 : 5, 0});
+    const Detection a = with.process(image);
+    const Detection b = without.process(image);
+    EXPECT_EQ(a.frame, b.frame);
+    EXPECT_EQ(a.status, b.status) << frame;
+    EXPECT_EQ(a.match, b.match) << frame;
+    EXPECT_EQ(a.score, b.score) << frame;
+    EXPECT_FALSE(a.earlier_match.has_value());
+    loops += a.status == Status::loop;
+  }
+  EXPECT_GT(loops, kLap / 2);
+}
+
+TEST_F(MapSession, EarlierSessionsAreRecognisedFromTheFirstFrameOn) {
+  drive(0, kLap - 1);
+  const auto detections = drive(5, kLap - 1, {6, 2});
+  for (const Detection& detection : detections) {
+    EXPECT_EQ(detection.status, Status::loop) << detection.frame;
+    ASSERT_TRUE(detection.earlier_match.has_value()) << detection.frame;
+    EXPECT_EQ(*detection.earlier_match, (SessionFrame{1, detection.frame + 5}));
+    EXPECT_FALSE(detection.match.has_value());
+  }
+  MapReader map(path("map.db"));
+  ASSERT_EQ(map.loops().size(), detections.size());
+  EXPECT_EQ(map.loops()[3].query, (SessionFrame{2, 3}));
+  EXPECT_EQ(map.loops()[3].match, (SessionFrame{1, 8}));
+}
+
+TEST_F(MapSession, TheFirstFrameOfAMapHasNoEarlierPlace) {
+  EXPECT_EQ(drive(0, 0).front().status, Status::no_earlier_place);
+  EXPECT_EQ(drive(0, 0).front().status, Status::loop);
+}
+
+TEST_F(MapSession, TimesOfEarlierSessionsDoNotMatter) {
+  LoopDetectorOptions options = fast_options();
+  options.exclusion.seconds = 100;
+  for (int session = 1; session <= 2; ++session) {
+    const auto map = std::make_shared<MapWriter>(path("map.db"), options, "drive");
+    LoopDetector detector(options, map);
+    for (int place = 0; place < kLap; ++place) {
+      const Detection detection = detector.process(view(place, {3, 0}), 5.0 + place);
+      EXPECT_EQ(detection.status, session == 1 ? Status::no_earlier_place : Status::loop);
+    }
+  }
+}
+
+TEST_F(MapSession, QueriesRankThePlacesOfAllSessions) {
+  drive(0, kLap - 1);
+  drive(0, kLap - 1, {8, 0});
+  const auto map = std::make_shared<MapReader>(path("map.db"));
+  LoopDetector detector(map->options(), map);
+  std::vector<RankedPlace> places;
+  const Detection detection = detector.query(view(7, {8, 1}), std::nullopt, &places);
+  EXPECT_EQ(detection.status, Status::loop);
+  ASSERT_GE(places.size(), 2U);
+  EXPECT_EQ(places[0].place, (SessionFrame{2, 7}));
+  EXPECT_EQ(places[1].place, (SessionFrame{1, 7}));
+  EXPECT_EQ(places[0].score, detection.score);
+  EXPECT_EQ(places[0].inliers, detection.inliers);
+  EXPECT_EQ(detection.earlier_match, places[0].place);
+  for (std::size_t i = 1; i < places.size(); ++i) EXPECT_GE(places[i - 1].score, places[i].score);
+  EXPECT_EQ(detector.query(view(kLap + 3)).status == Status::loop, false);
+  expect_error(ErrorKind::option, {path("map.db"), "MapWriter"},
+               [&] { detector.process(view(1)); });
+}
+
+TEST_F(MapSession, AQueryOfTheSameSessionIsSessionZero) {
+  LoopDetector detector(fast_options());
+  for (int place = 0; place < kLap; ++place) detector.process(view(place));
+  std::vector<RankedPlace> places;
+  (void)detector.query(view(2, {4, 0}), std::nullopt, &places);
+  ASSERT_FALSE(places.empty());
+  EXPECT_EQ(places[0].place, (SessionFrame{0, 2}));
+}
+
+TEST_F(MapSession, PlacesWithoutTheirFeaturesAreNeverMatched) {
+  drive(0, kLap - 1);
+  change(path("map.db"), "DELETE FROM features WHERE place = 8");
+  const auto map = std::make_shared<MapReader>(path("map.db"));
+  const LoopDetector detector(map->options(), map);
+  EXPECT_EQ(detector.query(view(8, {4, 0})).earlier_match, (SessionFrame{1, 8}));
+  const Detection lost = detector.query(view(7, {4, 0}));
+  EXPECT_NE(lost.status, Status::loop);
+  EXPECT_EQ(map->damage().size(), 1U);
+}
+
+TEST_F(MapSession, AgreementDoesNotReachFromSessionToSession) {
+  // Frame k of session 1 and frame k + 1 of session 2 show the same; what supports the one is no
+  // support for the other.
+  drive(0, 3);
+  drive(4, kLap - 1);
+  const auto detections = drive(4, kLap - 1, {2, 0});
+  EXPECT_EQ(detections.front().score, detections.front().score);
+  const auto alone = [&] {
+    const auto map = std::make_shared<MapReader>(path("map.db"));
+    const LoopDetector detector(map->options(), map);
+    return detector.query(view(4, {2, 0})).score;
+  }();
+  EXPECT_EQ(detections.front().score, alone);
+  EXPECT_GT(detections[2].score, static_cast<double>(0));
+}
+
+}  // namespace
+}  // namespace loopbit::test

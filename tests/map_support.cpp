@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "map_support.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <tuple>
+
+#include <gtest/gtest.h>
+
+#include "loopbit/database.hpp"
+
+#include "test_support.hpp"
+
+namespace loopbit::test {
+
+LoopDetectorOptions fast_options() {
+  LoopDetectorOptions options;
+  options.surf = {.working_side_px = 320, .max_keypoints = 300};
+  return options;
+}
+
+/// Features of the frame `number`: a few, whose values follow from it.
+Features few_features(int number) {
+  Features features;
+  features.working_size_px = {640, 480};
+  features.num_dark = 1;
+  for (int i = 0; i < 3; ++i) {
+    features.keypoints.push_back({static_cast<float>(number), static_cast<float>(i), 1.2F, 0.0F});
+    features.descriptors.emplace_back();
+    features.descriptors.back().fill(static_cast<std::int8_t>(number + i));
+  }
+  return features;
+}
+
+BinaryContent content_of(int number) {
+  Random random(number);
+  return random_content(random, 0.3);
+}
+
+bool same_features(const Features& a, const Features& b) {
+  const auto values = [](const Keypoint& k) {
+    return std::tuple(k.x_px, k.y_px, k.scale, k.angle_rad);
+  };
+  return a.working_size_px == b.working_size_px && a.num_dark == b.num_dark &&
+         a.descriptors == b.descriptors &&
+         std::equal(a.keypoints.begin(), a.keypoints.end(), b.keypoints.begin(), b.keypoints.end(),
+                    [&](const Keypoint& p, const Keypoint& q) { return values(p) == values(q); });
+}
+
+void add_frame(MapWriter& map, int frame, std::optional<SessionFrame> loop) {
+  Detection detection{.frame = frame, .timestamp_s = 0.5 * frame};
+  if (loop) {
+    detection.status = Status::loop;
+    detection.earlier_match = loop;
+    detection.score = 30.5;
+    detection.similarity = 0.25;
+    detection.matches = 40;
+    detection.inliers = 31;
+  }
+  map.add(detection, content_of(frame), std::make_shared<const Features>(few_features(frame)));
+}
+
+/// A map of one more session of `frames` frames.
+void add_session(const std::string& path, int frames, const std::string& name,
+                 std::optional<SessionFrame> loop_of_last) {
+  MapWriter map(path, fast_options(), name);
+  for (int frame = 0; frame < frames; ++frame) {
+    add_frame(map, frame, frame + 1 == frames ? loop_of_last : std::nullopt);
+  }
+  map.finish();
+}
+
+std::vector<MapPlace> places_of(MapReader& map) {
+  std::vector<MapPlace> places;
+  map.for_each_place([&](const MapPlace& place) { places.push_back(place); });
+  return places;
+}
+
+std::vector<MapPlace> places_of(const std::string& path) {
+  MapReader map(path);
+  return places_of(map);
+}
+
+/// Every place is what add_session() wrote for its frame, or it is not there.
+void expect_only_true_places(MapReader& map) {
+  for (const MapPlace& place : places_of(map)) {
+    EXPECT_EQ(place.content, content_of(place.at.frame)) << place.id;
+    EXPECT_EQ(place.timestamp_s, 0.5 * place.at.frame);
+    const auto features = map.features_of(place);
+    if (!features) continue;
+    EXPECT_TRUE(same_features(*features, few_features(place.at.frame))) << place.id;
+  }
+}
+
+std::string read_bytes(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+void change(const std::string& path, const std::string& sql) {
+  const Database database(path, Database::Access::create, {});
+  database.execute(sql);
+}
+
+}  // namespace loopbit::test

@@ -1,0 +1,172 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/map_tools.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "map_support.hpp"
+#include "test_support.hpp"
+#include "thinning.hpp"
+
+namespace loopbit::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+class MapTools : public ScratchTest {};
+
+TEST_F(MapTools, MergingAddsEachSessionOnce) {
+  add_session(path("a.db"), 3, "first of a");
+  add_session(path("b.db"), 4, "first of b");
+  add_session(path("b.db"), 5, "second of b", SessionFrame{1, 2});
+  MergeCounts counts = merge_map(path("a.db"), path("b.db"));
+  EXPECT_EQ(counts.sessions, 2);
+  EXPECT_EQ(counts.places, 9);
+  EXPECT_EQ(counts.loops, 1);
+  EXPECT_EQ(counts.known, 0);
+  counts = merge_map(path("a.db"), path("b.db"));
+  EXPECT_EQ(counts.sessions, 0);
+  EXPECT_EQ(counts.known, 2);
+
+  MapReader map(path("a.db"));
+  EXPECT_EQ(map.sessions().size(), 3U);
+  EXPECT_EQ(map.sessions()[2].name, "second of b");
+  EXPECT_EQ(places_of(map).size(), 12U);
+  expect_only_true_places(map);
+  EXPECT_EQ(map.loops().at(0).query, (SessionFrame{3, 4}));
+  EXPECT_EQ(map.loops().at(0).match, (SessionFrame{2, 2}));
+  EXPECT_TRUE(check_map(path("a.db")).damage.empty());
+}
+
+TEST_F(MapTools, ALoopIntoAKnownSessionIsKept) {
+  add_session(path("b.db"), 4, "first");
+  merge_map(path("a.db"), path("b.db"));
+  add_session(path("b.db"), 5, "second", SessionFrame{1, 2});
+  const MergeCounts counts = merge_map(path("a.db"), path("b.db"));
+  EXPECT_EQ(counts.known, 1);
+  EXPECT_EQ(counts.loops, 1);
+  EXPECT_EQ(MapReader(path("a.db")).loops().at(0).match, (SessionFrame{1, 2}));
+}
+
+TEST_F(MapTools, MapsOfOtherSettingsAreNotMerged) {
+  add_session(path("a.db"), 3);
+  LoopDetectorOptions options = fast_options();
+  options.binary_content.gamma = 3;
+  {
+    MapWriter map(path("b.db"), options, "drive");
+    add_frame(map, 0);
+  }
+  expect_error(ErrorKind::option, {path("a.db"), "binary_content.gamma"},
+               [&] { merge_map(path("a.db"), path("b.db")); });
+  EXPECT_EQ(places_of(path("a.db")).size(), 3U);
+}
+
+TEST_F(MapTools, OfADamagedMapNothingIsMerged) {
+  add_session(path("a.db"), 3);
+  add_session(path("b.db"), 3);
+  change(path("b.db"), "UPDATE place SET frame = 9 WHERE place = 2");
+  expect_error(ErrorKind::input, {path("b.db"), "place 2"},
+               [&] { merge_map(path("a.db"), path("b.db")); });
+  EXPECT_EQ(MapReader(path("a.db")).sessions().size(), 1U);
+  EXPECT_EQ(places_of(path("a.db")).size(), 3U);
+}
+
+TEST_F(MapTools, DroppingASessionForgetsItAndNoOther) {
+  const std::string map_path = path("a.db");
+  add_session(map_path, 200, "first");
+  add_session(map_path, 5, "second", SessionFrame{1, 2});
+  add_session(map_path, 6, "third", SessionFrame{2, 3});
+  const CompactCounts counts = compact_map(map_path, {.drop_sessions = {1, 3}});
+  EXPECT_EQ(counts.places_before, 211);
+  EXPECT_EQ(counts.places_after, 5);
+  EXPECT_LT(counts.bytes_after, counts.bytes_before);
+  EXPECT_EQ(fs::file_size(map_path), counts.bytes_after);
+  MapReader map(map_path);
+  ASSERT_EQ(map.sessions().size(), 1U);
+  EXPECT_EQ(map.sessions()[0].session, 2);
+  EXPECT_TRUE(map.loops().empty());
+  expect_only_true_places(map);
+  expect_error(ErrorKind::option, {map_path, "session 7"},
+               [&] { compact_map(map_path, {.drop_sessions = {7}}); });
+}
+
+TEST_F(MapTools, NumbersAreNeverGivenTwice) {
+  const std::string map_path = path("a.db");
+  add_session(map_path, 3);
+  add_session(map_path, 3);
+  const auto last = places_of(map_path).back().id;
+  compact_map(map_path, {.drop_sessions = {2}});
+  add_session(map_path, 3);
+  EXPECT_EQ(MapReader(map_path).sessions().back().session, 3);
+  EXPECT_EQ(places_of(map_path).back().at, (SessionFrame{3, 2}));
+  EXPECT_GT(places_of(map_path)[3].id, last);
+}
+
+TEST_F(MapTools, AMapThatIsReadIsNotCompacted) {
+  const std::string map_path = path("a.db");
+  add_session(map_path, 3);
+  const MapWriter writer(map_path, fast_options(), "drive");
+  expect_error(ErrorKind::output, {map_path},
+               [&] { compact_map(map_path, {.drop_sessions = {1}}); });
+  EXPECT_EQ(places_of(map_path).size(), 3U);
+}
+
+TEST_F(MapTools, ABudgetKeepsWhatOthersDoNotStandFor) {
+  Random random;
+  std::vector<ThinnedPlace> places;
+  for (int i = 0; i < 10; ++i) places.push_back({content_of(0), 1});
+  places.push_back({content_of(1), 1});
+  for (int i = 0; i < 10; ++i) places.push_back({content_of(2), 1});
+  places.push_back({content_of(1), 2, 10});
+  const auto kept = kept_places(places, 3);
+  EXPECT_EQ(std::count(kept.begin(), kept.end(), true), 3);
+  EXPECT_EQ(std::count(kept.begin(), kept.begin() + 10, true), 1);
+  EXPECT_EQ(kept[10] + kept[21], 1);
+  EXPECT_EQ(std::count(kept.begin() + 11, kept.begin() + 21, true), 1);
+  EXPECT_EQ(kept_places(places, 3), kept);
+  const auto all = kept_places(places, 100);
+  EXPECT_EQ(std::count(all.begin(), all.end(), true), 22);
+}
+
+TEST_F(MapTools, ThinningSpreadsOverAPath) {
+  // Each place shares half its pixels with the next: no stretch may be emptied.
+  std::vector<ThinnedPlace> places;
+  BinaryContent content = content_of(0);
+  for (int i = 0; i < 64; ++i) {
+    content.rows[static_cast<std::size_t>(i)] = content_of(1).rows[static_cast<std::size_t>(i)];
+    places.push_back({content, 1});
+  }
+  const auto kept = kept_places(places, 8);
+  int gap = 0;
+  int longest = 0;
+  for (const bool keep : kept) {
+    gap = keep ? 0 : gap + 1;
+    longest = std::max(longest, gap);
+  }
+  EXPECT_EQ(std::count(kept.begin(), kept.end(), true), 8);
+  EXPECT_LE(longest, 20);
+}
+
+TEST_F(MapTools, ExportsNumberFramesThroughAllSessions) {
+  add_session(path("a.db"), 10, "first");
+  add_session(path("a.db"), 5, "second", SessionFrame{1, 7});
+  MapReader map(path("a.db"));
+  EXPECT_EQ(export_loops(map, ExportFormat::csv),
+            "query,match,score,query_session,query_frame,match_session,match_frame,similarity,"
+            "matches,inliers\n14,7,30.5,2,4,1,7,0.250000,40,31\n");
+  EXPECT_EQ(export_loops(map, ExportFormat::g2o),
+            "VERTEX_SE3:QUAT 7 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 14 0 0 0 0 0 0 1\n"
+            "EDGE_SE3:QUAT 7 14 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n");
+  const std::string json = export_loops(map, ExportFormat::json);
+  EXPECT_NE(json.find("\"query\": {\n        \"session\": 2,\n        \"frame\": 4"),
+            std::string::npos)
+      << json;
+}
+
+}  // namespace
+}  // namespace loopbit::test
