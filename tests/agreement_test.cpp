@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "agreement.hpp"
 
+#include <cmath>
 #include <cstddef>
 
 #include <gtest/gtest.h>
@@ -9,9 +10,9 @@
 namespace loopbit::test {
 namespace {
 
-/// Two steps support, at half weight; 8 inliers are chance.
-DecisionOptions two_steps() {
-  return {.agreement_steps = 2, .agreement_weight = 0.5, .chance_inliers = 8};
+/// Half of the support adds to the score and half of it is left after a step; 8 is chance.
+DecisionOptions halves() {
+  return {.chance_evidence = 8, .agreement_weight = 0.5, .agreement_memory = 0.5};
 }
 
 /// Only the distinct inliers are evidence, and only steps tell how far places are apart.
@@ -28,21 +29,33 @@ double score_of_next_step(const Agreement& agreement) {
   return agreement.score(candidate(100, 15), true);
 }
 
-TEST(Agreement, ScoreOfTheFirstFrameIsItsInliers) {
-  EXPECT_DOUBLE_EQ(score_of_next_step(Agreement(two_steps())), 15);
-  EXPECT_DOUBLE_EQ(Agreement(two_steps()).score(candidate(100, 15), false), 15);
+TEST(Agreement, ScoreOfTheFirstFrameIsItsEvidence) {
+  EXPECT_DOUBLE_EQ(score_of_next_step(Agreement(halves())), 15);
+  EXPECT_DOUBLE_EQ(Agreement(halves()).score(candidate(100, 15), false), 15);
 }
 
-TEST(Agreement, StepsBeforeAddTheirInliersBeyondChance) {
-  Agreement agreement(two_steps());
+TEST(Agreement, StepsBeforeAddTheirEvidenceBeyondChanceTheLessTheLongerAgo) {
+  Agreement agreement(halves());
+  agreement.remember({candidate(97, 48)});
+  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15 + 0.5 * 40);
   agreement.remember({candidate(98, 18)});
-  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15 + 0.5 * 10);
-  agreement.remember({candidate(99, 28)});
   EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15 + 0.5 * (10 + 20));
+  agreement.remember({candidate(99, 28)});
+  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15 + 0.5 * (20 + 5 + 10));
+}
+
+TEST(Agreement, CountsEvidenceNotInliers) {
+  VerifiedCandidate half = candidate(99, 56);
+  half.inlier_worth = 0.5;
+  Agreement agreement(halves());
+  agreement.remember({half});
+  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15 + 0.5 * 20);
+  half.distinctness = 0.5;
+  EXPECT_DOUBLE_EQ(agreement.score(half, true), 14 + 0.5 * 20);
 }
 
 TEST(Agreement, FrameThatShowsTheLastStepAgainIsNotSupportedByIt) {
-  Agreement agreement(two_steps());
+  Agreement agreement(halves());
   agreement.remember({candidate(98, 18)});
   EXPECT_DOUBLE_EQ(agreement.score(candidate(100, 15), false), 15);
   agreement.remember({candidate(99, 28)});
@@ -50,7 +63,7 @@ TEST(Agreement, FrameThatShowsTheLastStepAgainIsNotSupportedByIt) {
 }
 
 TEST(Agreement, StandingStillKeepsTheScore) {
-  Agreement agreement(two_steps());
+  Agreement agreement(halves());
   agreement.remember({candidate(97, 12)});
   agreement.remember({candidate(98, 18)});
   const double moving = score_of_next_step(agreement);
@@ -58,8 +71,8 @@ TEST(Agreement, StandingStillKeepsTheScore) {
   EXPECT_DOUBLE_EQ(agreement.score(candidate(100, 15), false), moving);
 }
 
-TEST(Agreement, ChanceInliersSupportNothing) {
-  Agreement agreement(two_steps());
+TEST(Agreement, ChanceSupportsNothing) {
+  Agreement agreement(halves());
   agreement.remember({candidate(100, 8)});
   EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15);
   agreement.remember({candidate(100, 3)});
@@ -70,58 +83,58 @@ TEST(Agreement, ChanceInliersSupportNothing) {
 
 TEST(Agreement, OnlyNearbyCandidatesSupport) {
   for (const std::ptrdiff_t near : {97, 103}) {
-    Agreement agreement(two_steps());
+    Agreement agreement(halves());
     agreement.remember({candidate(near, 18)});
     EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 20) << near;
   }
   for (const std::ptrdiff_t far : {0, 96, 104, 500}) {
-    Agreement agreement(two_steps());
+    Agreement agreement(halves());
     agreement.remember({candidate(far, 18)});
     EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15) << far;
   }
 }
 
-TEST(Agreement, TheStepBeforeTheLastMayBeTwiceAsFar) {
-  for (const std::ptrdiff_t near : {94, 106}) {
-    Agreement agreement(two_steps());
-    agreement.remember({candidate(near, 18)});
-    agreement.remember({});
-    EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 20) << near;
-  }
-  Agreement agreement(two_steps());
-  agreement.remember({candidate(93, 18)});
-  agreement.remember({});
-  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15);
-}
-
 TEST(Agreement, BestNeighbourOfAStepSupportsAlone) {
-  Agreement agreement(two_steps());
+  Agreement agreement(halves());
   agreement.remember({candidate(99, 12), candidate(101, 18), candidate(102, 10), candidate(7, 99)});
   EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 20);
 }
 
-TEST(Agreement, FadesAfterItsSteps) {
-  Agreement agreement(two_steps());
+TEST(Agreement, StepWithoutTheCandidateEndsItsSupport) {
+  Agreement agreement(halves());
   agreement.remember({candidate(100, 28)});
-  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 25);
-  agreement.remember({});
-  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 25);
-  agreement.remember({});
+  agreement.remember({candidate(7, 28)});
   EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15);
-  EXPECT_DOUBLE_EQ(agreement.score(candidate(100, 15), false), 25) << "two before the last step";
 }
 
-TEST(Agreement, WithoutStepsTheScoreIsTheInliers) {
-  Agreement agreement({.agreement_steps = 0});
+TEST(Agreement, WithoutWeightTheScoreIsTheEvidence) {
+  Agreement agreement({.agreement_weight = 0});
   agreement.remember({candidate(100, 50)});
   EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15);
-  EXPECT_DOUBLE_EQ(agreement.score(candidate(100, 15), false), 15);
 }
 
 TEST(Agreement, WithoutInliersThereIsNoScore) {
-  Agreement agreement(two_steps());
+  Agreement agreement(halves());
   agreement.remember({candidate(100, 50)});
   EXPECT_DOUBLE_EQ(agreement.score(candidate(100, 0), true), 0);
+}
+
+TEST(InlierWorth, GrowsWithTheShareUpToTheFullOne) {
+  const DecisionOptions options{.full_share = 0.2};
+  EXPECT_DOUBLE_EQ(inlier_worth(0.0, 1000, options), 0);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.05, 1000, options), 0.5);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.2, 1000, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.9, 1000, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.0, 1000, {.full_share = 0}), 1) << "switched off";
+}
+
+TEST(InlierWorth, GrowsWithTheMapUpToTheFullOne) {
+  const DecisionOptions options{.full_steps = 99};
+  EXPECT_DOUBLE_EQ(inlier_worth(1, 0, options), 0);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, 9, options), 0.5);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, 99, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, 100'000, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, 1, {.full_steps = 1}), 1) << "switched off";
 }
 
 }  // namespace

@@ -381,6 +381,35 @@ TEST(DistinctInliers, WithoutSpacingAllCount) {
 
 // Both
 
+// The share of features that inliers explain
+
+/// Features at `points`, of which the first `num_inliers` are inliers.
+double share(const std::vector<cv::Point2d>& points, int num_inliers) {
+  TwoViews views;
+  for (const cv::Point2d& point : points) views.add(point, point);
+  views.matches.resize(static_cast<std::size_t>(num_inliers));
+  return explained_share(views.query, views.matches);
+}
+
+TEST(ExplainedShare, IsThatOfTheFeaturesAmidTheInliers) {
+  const std::vector<cv::Point2d> points{{100, 100}, {200, 100}, {100, 200}, {200, 200},
+                                        {150, 150}, {120, 180}, {300, 150}, {150, 99}};
+  EXPECT_DOUBLE_EQ(share(points, 4), 4.0 / 6);
+  EXPECT_DOUBLE_EQ(share(points, 5), 5.0 / 6);
+  EXPECT_DOUBLE_EQ(share(points, 8), 1);
+  EXPECT_DOUBLE_EQ(share(points, 1), 1);
+  EXPECT_DOUBLE_EQ(share(points, 0), 0);
+}
+
+TEST(ExplainedShare, LeavesOutTheOuterTenths) {
+  std::vector<cv::Point2d> points;
+  for (int i = 0; i < 10; ++i) points.emplace_back(10 * i, 10 * i);
+  EXPECT_DOUBLE_EQ(share(points, 10), 1);
+  points.emplace_back(5, 5);    // beyond the second of ten
+  points.emplace_back(50, 50);  // amid them
+  EXPECT_DOUBLE_EQ(share(points, 10), 8.0 / 9);
+}
+
 TEST(Verify, ShiftedViewHasManyInliers) {
   const Features query = extract_surf(view(2));
   const Verification result = verify(query, extract_surf(view(2, {12, 5})));

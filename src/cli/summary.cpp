@@ -22,6 +22,7 @@ void print_reasons(const std::vector<Detection>& detections) {
       {Status::few_matches, "no candidate shares enough features"},
       {Status::no_geometry, "features match, but not as one rigid scene"},
       {Status::low_score, "a geometry, but too little evidence"},
+      {Status::ambiguous, "enough evidence, but other places share it"},
       {Status::unreadable, "image unreadable"}};
   for (const auto& [status, meaning] : kReasons) {
     const auto frames = count(detections, status);

@@ -3,6 +3,7 @@
 #include "agreement.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <utility>
 
@@ -13,38 +14,42 @@ namespace {
 /// revisits may be slower or faster than the first visit, and candidates are only so finely spaced.
 constexpr std::ptrdiff_t kMaxStepsPerStep = 3;
 
-int best_evidence_near(const std::vector<VerifiedCandidate>& earlier, std::ptrdiff_t step,
-                       std::ptrdiff_t radius) {
-  int best = 0;
-  for (const VerifiedCandidate& other : earlier) {
-    if (std::abs(other.step - step) <= radius) best = std::max(best, other.distinct_inliers);
-  }
-  return best;
-}
-
 }  // namespace
 
-double Agreement::score(const VerifiedCandidate& verified, bool is_step) const {
-  if (verified.distinct_inliers == 0) return 0.0;
-  const auto steps = static_cast<std::ptrdiff_t>(recent_.size());
-  const std::ptrdiff_t latest = is_step ? steps - 1 : steps - 2;
-  const std::ptrdiff_t oldest = std::max<std::ptrdiff_t>(0, latest + 1 - options_.agreement_steps);
-  int support = 0;
-  for (std::ptrdiff_t i = latest; i >= oldest; --i) {
-    const std::ptrdiff_t radius = kMaxStepsPerStep * (latest + 1 - i);
-    const int evidence =
-        best_evidence_near(recent_[static_cast<std::size_t>(i)], verified.step, radius);
-    support += std::max(0, evidence - options_.chance_inliers);
+double inlier_worth(double explained_share, std::ptrdiff_t earlier_steps,
+                    const DecisionOptions& options) {
+  double worth = 1;
+  if (explained_share < options.full_share) worth = std::sqrt(explained_share / options.full_share);
+  if (earlier_steps < options.full_steps) {
+    worth *= std::log1p(static_cast<double>(earlier_steps)) / std::log1p(options.full_steps);
   }
-  return verified.distinct_inliers + options_.agreement_weight * support;
+  return worth;
 }
 
-void Agreement::remember(std::vector<VerifiedCandidate> step) {
-  recent_.push_back(std::move(step));
-  // One more than can support, for a query that shows what the last step showed.
-  while (recent_.size() > static_cast<std::size_t>(options_.agreement_steps) + 1) {
-    recent_.pop_front();
+double Agreement::support_near(const std::vector<Trail>& trails, std::ptrdiff_t step) {
+  double support = 0;
+  for (const Trail& trail : trails) {
+    if (std::abs(trail.step - step) <= kMaxStepsPerStep) support = std::max(support, trail.support);
   }
+  return support;
+}
+
+double Agreement::score(const VerifiedCandidate& verified, bool is_step) const {
+  const double evidence = verified.evidence();
+  if (evidence == 0) return 0;
+  const std::vector<Trail>& trails = is_step ? latest_ : before_latest_;
+  return evidence + options_.agreement_weight * support_near(trails, verified.step);
+}
+
+void Agreement::remember(const std::vector<VerifiedCandidate>& step) {
+  std::vector<Trail> trails;
+  trails.reserve(step.size());
+  for (const VerifiedCandidate& v : step) {
+    const double beyond_chance = std::max(0.0, v.evidence() - options_.chance_evidence);
+    const double before = options_.agreement_memory * support_near(latest_, v.step);
+    trails.push_back({v.step, beyond_chance + before});
+  }
+  before_latest_ = std::exchange(latest_, std::move(trails));
 }
 
 }  // namespace loopbit

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <deque>
 #include <vector>
 
 #include "loopbit/loop_detector_options.hpp"
@@ -18,29 +17,48 @@ struct VerifiedCandidate {
   int matches = 0;
   int inliers = 0;
   int distinct_inliers = 0;
+  double inlier_worth = 1;  ///< 0 to 1, see inlier_worth()
+  double distinctness = 1;  ///< 0 to 1, see distinctness()
+
+  /// That it shows the same place, in distinct inliers that count in full.
+  [[nodiscard]] double evidence() const { return distinct_inliers * inlier_worth * distinctness; }
 };
 
-/// The verified candidates of the last few steps: frames that changed the view. A robot that
-/// revisits keeps revisiting, so steps just before the query that verified against the same stretch
-/// of the past support its match. Steps are counted, not frames, because a frame that shows the
+/// What one distinct inlier counts, 0 to 1. `explained_share`: see there. `earlier_steps`: changes
+/// of view that the map holds: how rare a thing is can be known no better than by one in so many,
+/// so that evidence counts less while a map is small.
+double inlier_worth(double explained_share, std::ptrdiff_t earlier_steps,
+                    const DecisionOptions& options);
+
+/// Agreement over time: a robot that revisits keeps revisiting, so the steps just before the query
+/// (frames that changed the view) support its match if they verified against the same stretch of
+/// the past, the less the longer ago. Steps are counted, not frames, because a frame that shows the
 /// same as the one before is no second witness.
 class Agreement {
  public:
   explicit Agreement(const DecisionOptions& options) : options_(options) {}
 
-  /// The score of a verified candidate of the next frame: its distinct inliers, and those beyond
-  /// chance of the best neighbouring candidate in each of the steps before, at a lower weight. 0
-  /// without inliers. `is_step`: the next frame is a step itself; else it shows what the last step
-  /// showed, which then supports nothing. This number, and no other, is compared with
-  /// decision.min_score.
+  /// The score of a verified candidate of the next frame: its evidence and, at a lower weight, the
+  /// support of the steps before; 0 without evidence. `is_step`: the next frame is a step itself;
+  /// else it shows what the last step showed, which then supports nothing. This number, and no
+  /// other, is compared with decision.min_score.
   [[nodiscard]] double score(const VerifiedCandidate& verified, bool is_step) const;
 
   /// Notes the candidates of a step.
-  void remember(std::vector<VerifiedCandidate> step);
+  void remember(const std::vector<VerifiedCandidate>& step);
 
  private:
+  /// The evidence of a way along the past, up to one of its steps.
+  struct Trail {
+    std::ptrdiff_t step = 0;
+    double support = 0;
+  };
+
+  static double support_near(const std::vector<Trail>& trails, std::ptrdiff_t step);
+
   DecisionOptions options_;
-  std::deque<std::vector<VerifiedCandidate>> recent_;  ///< the latest step last
+  std::vector<Trail> latest_;         ///< one a candidate of the last step
+  std::vector<Trail> before_latest_;  ///< of the step before
 };
 
 }  // namespace loopbit

@@ -18,6 +18,8 @@ std::string_view to_string(Status status) {
       return "no_geometry";
     case Status::low_score:
       return "low_score";
+    case Status::ambiguous:
+      return "ambiguous";
     case Status::unreadable:
       return "unreadable";
   }

@@ -16,6 +16,8 @@
 #include "loopbit/kernels.hpp"
 
 #include "agreement.hpp"
+#include "distinctness.hpp"
+#include "known_loops.hpp"
 #include "place_memory.hpp"
 #include "recent_view.hpp"
 
@@ -24,6 +26,8 @@ namespace {
 
 /// Two frames this alike show the same view: the camera has hardly moved in between.
 constexpr double kUnmovedSimilarity = 0.8;
+/// Different places share a few inliers by chance; with so many they share a thing.
+constexpr int kMinSightingInliers = 8;
 
 class Stopwatch {
  public:
@@ -40,7 +44,18 @@ class Stopwatch {
 
 Status reason_of_rejection(const VerifiedCandidate& best, const VerificationOptions& options) {
   if (best.matches < options.min_matches) return Status::few_matches;
-  return best.inliers == 0 ? Status::no_geometry : Status::low_score;
+  return best.evidence() == 0 ? Status::no_geometry : Status::low_score;
+}
+
+/// Inliers that moved between two images. Those that did not may be the robot itself, dirt on the
+/// lens or its rim, which are in view for ever.
+int moved_inliers(const Features& query, const Features& place, const std::vector<Match>& inliers) {
+  constexpr float kMinMotion_px = 2.0F;
+  return static_cast<int>(std::count_if(inliers.begin(), inliers.end(), [&](const Match& match) {
+    const Keypoint& a = query.keypoints[static_cast<std::size_t>(match.query)];
+    const Keypoint& b = place.keypoints[static_cast<std::size_t>(match.place)];
+    return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px) > kMinMotion_px;
+  }));
 }
 
 /// Of a keypoint in its image, 0 to 1.
@@ -77,6 +92,7 @@ class LoopDetector::Impl {
     BinaryContent content;
     Features features;
     RecentView::Look look;
+    std::ptrdiff_t earlier_steps = 0;  ///< that may be candidates
     std::vector<VerifiedCandidate> verified;
     std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
   };
@@ -100,6 +116,7 @@ class LoopDetector::Impl {
     detection.times.features_ms = stopwatch.lap_ms();
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, timestamp_s);
+    seen.earlier_steps = steps_before(end);
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike.
@@ -129,7 +146,7 @@ class LoopDetector::Impl {
   /// How each candidate scored, in the order in which decide() ranks them.
   [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen) const {
     for (std::size_t i = 0; i < seen.verified.size(); ++i) {
-      find_geometry(seen.features, seen.verified[i], verifications_[i]);
+      find_geometry(seen, seen.verified[i], verifications_[i]);
     }
     if (seen.best) {
       std::erase_if(seen.verified, [&](const VerifiedCandidate& v) {
@@ -154,7 +171,12 @@ class LoopDetector::Impl {
   void remember(Observation seen, const Detection& detection) {
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection);
     recent_view_.remember(place, seen.look);
-    if (seen.look.is_step) agreement_.remember(std::move(seen.verified));
+    if (detection.status == Status::loop) {
+      known_loops_.add(recent_view_.step_of(place), seen.best->step);
+    }
+    if (!seen.look.is_step) return;
+    if (seen.best) seen.verified.push_back(*seen.best);
+    agreement_.remember(seen.verified);
   }
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
@@ -187,6 +209,11 @@ class LoopDetector::Impl {
     return place < memory_.session_begin() ? memory_.step_of(place) : recent_view_.step_of(place);
   }
 
+  /// How many changes of view the places below `end` have seen.
+  [[nodiscard]] std::ptrdiff_t steps_before(PlaceId end) const {
+    return memory_.earlier_steps() + (end == 0 ? 0 : recent_view_.step_of(end - 1) + 1);
+  }
+
   void check_time(std::optional<double> timestamp_s) const {
     if (options_.exclusion.seconds <= 0) return;
     if (!timestamp_s || !std::isfinite(*timestamp_s)) {
@@ -217,22 +244,51 @@ class LoopDetector::Impl {
   }
 
   /// The second half: their geometry.
-  void find_geometry(const Features& query, VerifiedCandidate& candidate,
+  void find_geometry(const Observation& seen, VerifiedCandidate& candidate,
                      Verification& result) const {
-    verifier_.find_geometry(query, features(candidate.candidate.place), result);
+    const DecisionOptions& decision = options_.decision;
+    if (decision.count_matches) {
+      candidate.distinct_inliers = candidate.matches;
+      return;
+    }
+    verifier_.find_geometry(seen.features, features(candidate.candidate.place), result);
     candidate.inliers = static_cast<int>(result.inliers.size());
     candidate.distinct_inliers = result.distinct_inliers;
+    candidate.inlier_worth = inlier_worth(result.explained_share, seen.earlier_steps, decision);
   }
 
-  /// The score if all matches were distinct inliers: no geometry can lead to a higher one.
+  /// The score if all matches were distinct inliers that explain all around them: no geometry can
+  /// lead to a higher one.
   [[nodiscard]] double highest_score(VerifiedCandidate candidate, const Observation& seen) const {
     candidate.distinct_inliers = candidate.matches;
+    candidate.inlier_worth = inlier_worth(1.0, seen.earlier_steps, options_.decision);
     return agreement_.score(candidate, seen.look.is_step);
   }
 
+  /// The candidates with enough inliers to show that their place has what the query has.
+  [[nodiscard]] std::vector<Sighting> sightings(const Observation& seen) const {
+    std::vector<Sighting> sightings;
+    for (std::size_t i = 0; i < seen.verified.size(); ++i) {
+      const VerifiedCandidate& v = seen.verified[i];
+      if (v.distinct_inliers < kMinSightingInliers) continue;
+      sightings.push_back({v.step, known_loops_.first_visit(v.step), verifications_[i].inliers});
+    }
+    std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
+      return std::pair(a.first_visit, a.step) < std::pair(b.first_visit, b.step);
+    });
+    return sightings;
+  }
+
+  void find_distinctness(const std::vector<Sighting>& others, VerifiedCandidate& candidate,
+                         const Verification& result) const {
+    candidate.distinctness = distinctness(
+        {candidate.step, known_loops_.first_visit(candidate.step), result.inliers}, others);
+  }
+
   /// Matches all candidates, which is cheap, and seeks the geometry of the most promising first,
-  /// until none of the others can have a higher score than the best. Those keep no inliers: they
-  /// change nothing now, and support no later match.
+  /// until none of the others can have a higher score than the best. If one has more evidence than
+  /// chance gives, the others are verified all the same, to see which inliers they share. Those
+  /// left out keep no inliers: they change nothing now, and support no later match.
   void verify_candidates(const std::vector<Candidate>& candidates, Observation& seen) const {
     verifications_.resize(std::max(verifications_.size(), candidates.size()));
     std::vector<std::pair<double, std::size_t>> order;
@@ -243,10 +299,17 @@ class LoopDetector::Impl {
     }
     std::sort(order.begin(), order.end());
     double best = 0;
+    bool is_promising = false;
     for (const auto& [negative_bound, i] : order) {
-      if (-negative_bound < best) break;
-      find_geometry(seen.features, seen.verified[i], verifications_[i]);
+      if (-negative_bound < best && !is_promising) break;
+      find_geometry(seen, seen.verified[i], verifications_[i]);
       best = std::max(best, agreement_.score(seen.verified[i], seen.look.is_step));
+      is_promising |= seen.verified[i].evidence() > options_.decision.chance_evidence;
+    }
+    if (!is_promising || !options_.decision.distinctness) return;
+    const std::vector<Sighting> others = sightings(seen);
+    for (std::size_t i = 0; i < seen.verified.size(); ++i) {
+      find_distinctness(others, seen.verified[i], verifications_[i]);
     }
   }
 
@@ -257,9 +320,11 @@ class LoopDetector::Impl {
         similarity(seen.content, index_.content(recent_view_.latest_step())) < kUnmovedSimilarity;
     return recent_view_.look(index_.size(), is_step, [&](PlaceId place) {
       if (is_window_fixed()) return true;
-      VerifiedCandidate recent = matched(seen.features, {place, 0}, verification_);
-      find_geometry(seen.features, recent, verification_);
-      return recent.inliers >= options_.exclusion.in_view_inliers;
+      const Features& recent = features(place);
+      verifier_.match(seen.features, recent, verification_);
+      verifier_.find_geometry(seen.features, recent, verification_);
+      return moved_inliers(seen.features, recent, verification_.inliers) >=
+             options_.exclusion.in_view_inliers;
     });
   }
 
@@ -286,22 +351,38 @@ class LoopDetector::Impl {
   }
 
   /// Candidates stand apart; the best place of all may be a neighbour of one. Verifies those of the
-  /// best candidate.
-  [[nodiscard]] VerifiedCandidate refined(VerifiedCandidate best, const Observation& seen,
-                                          PlaceId end) const {
-    const PlaceId middle = best.candidate.place;
-    const int radius = options_.retrieval.min_spacing - 1;
+  /// best candidate, and takes the one with most inliers: all are the same place, or none.
+  [[nodiscard]] VerifiedCandidate refined(const VerifiedCandidate& candidate,
+                                          const Observation& seen, PlaceId end) const {
+    const auto closeness = [](const VerifiedCandidate& v) {
+      return std::tuple(v.distinct_inliers, v.inliers, v.candidate.similarity);
+    };
+    const std::vector<Sighting> others = sightings(seen);
+    const PlaceId middle = candidate.candidate.place;
+    const int radius = options_.retrieval.min_spacing;
+    VerifiedCandidate best = candidate;
     for (PlaceId place = std::max(0, middle - radius); place <= std::min(end - 1, middle + radius);
          ++place) {
       if (place == middle) continue;
       const double xi = similarity(seen.content, index_.content(place),
                                    options_.retrieval.shift_tolerance_columns);
       VerifiedCandidate neighbour = matched(seen.features, {place, xi}, verification_);
-      if (highest_score(neighbour, seen) < agreement_.score(best, seen.look.is_step)) continue;
-      find_geometry(seen.features, neighbour, verification_);
-      if (rank(neighbour, seen) > rank(best, seen)) best = neighbour;
+      if (neighbour.matches < best.distinct_inliers) continue;
+      find_geometry(seen, neighbour, verification_);
+      if (closeness(neighbour) <= closeness(best)) continue;
+      if (options_.decision.distinctness) find_distinctness(others, neighbour, verification_);
+      best = neighbour;
     }
     return best;
+  }
+
+  [[nodiscard]] Status judged(VerifiedCandidate best, const Observation& seen) const {
+    const auto accepted = [&] {
+      return agreement_.score(best, seen.look.is_step) >= options_.decision.min_score;
+    };
+    if (accepted()) return Status::loop;
+    best.distinctness = 1;
+    return accepted() ? Status::ambiguous : reason_of_rejection(best, options_.verification);
   }
 
   void decide(Observation& seen, PlaceId end, Detection& detection) const {
@@ -312,18 +393,17 @@ class LoopDetector::Impl {
     auto best = *std::max_element(
         seen.verified.begin(), seen.verified.end(),
         [&](const auto& a, const auto& b) { return rank(a, seen) < rank(b, seen); });
-    const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
-    const auto accepted = [&] { return score() >= options_.decision.min_score; };
     // Below, a neighbour is no likelier to be right than any other place.
-    if (score() > options_.decision.chance_inliers) best = refined(best, seen, end);
-    detection.status = accepted() ? Status::loop : reason_of_rejection(best, options_.verification);
+    const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
+    if (score() > options_.decision.chance_evidence) best = refined(best, seen, end);
     seen.best = best;
+    detection.score = score();
+    detection.status = judged(best, seen);
     if (best.candidate.place < memory_.session_begin()) {
       detection.earlier_match = memory_.origin(best.candidate.place);
     } else {
       detection.match = best.candidate.place - memory_.session_begin();
     }
-    detection.score = score();
     detection.similarity = best.candidate.similarity;
     detection.matches = best.matches;
     detection.inliers = best.inliers;
@@ -335,6 +415,7 @@ class LoopDetector::Impl {
   std::vector<double> times_s_;  ///< of each frame of this session; 0 where there is none
   RecentView recent_view_;
   Agreement agreement_;
+  KnownLoops known_loops_;
   // Working memory, which makes const functions unfit for threads.
   mutable SurfExtractor surf_;
   mutable Verifier verifier_;

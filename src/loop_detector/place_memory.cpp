@@ -7,12 +7,14 @@
 namespace loopbit {
 namespace {
 
-/// Sessions are so many steps apart: no neighbours, whatever agreement_steps is.
+/// Sessions are so many steps apart: no neighbours, whatever a match may move from one step to the
+/// next.
 constexpr int kStepsBetweenSessions = 1000;
 
 }  // namespace
 
 void PlaceMemory::add_earlier(const SessionFrame& origin, bool is_step) {
+  earlier_steps_ += is_step ? 1 : 0;
   int step = 0;
   if (!earlier_.empty()) {
     const EarlierPlace& last = earlier_.back();

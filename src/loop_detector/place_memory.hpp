@@ -31,6 +31,9 @@ class PlaceMemory {
   /// The first place of this session.
   [[nodiscard]] PlaceId session_begin() const { return static_cast<PlaceId>(earlier_.size()); }
 
+  /// Changes of view in earlier sessions.
+  [[nodiscard]] std::ptrdiff_t earlier_steps() const { return earlier_steps_; }
+
   /// The two below: place < session_begin().
   [[nodiscard]] const SessionFrame& origin(PlaceId place) const {
     return earlier_[static_cast<std::size_t>(place)].origin;
@@ -58,6 +61,7 @@ class PlaceMemory {
 
   std::shared_ptr<MapStorage> map_;
   std::vector<EarlierPlace> earlier_;
+  std::ptrdiff_t earlier_steps_ = 0;
   std::vector<Features> features_;  ///< without a map: of each place
   mutable std::vector<std::shared_ptr<const Features>> held_;
 };

@@ -37,6 +37,22 @@ bool overlap(const Keypoint& a, const Keypoint& b, double min_spacing_scales) {
   return dx * dx + dy * dy < spacing * spacing;
 }
 
+struct Range {
+  float min = 0;
+  float max = 0;
+
+  [[nodiscard]] bool contains(float value) const { return min <= value && value <= max; }
+};
+
+/// The middle 80 % of `values`, which it puts in another order.
+Range middle(std::vector<float>& values) {
+  const auto tenth = static_cast<std::ptrdiff_t>(values.size() / 10);
+  std::nth_element(values.begin(), values.begin() + tenth, values.end());
+  const float min = values[static_cast<std::size_t>(tenth)];
+  std::nth_element(values.begin(), values.end() - 1 - tenth, values.end());
+  return {min, *(values.end() - 1 - tenth)};
+}
+
 /// What matches say about two views; keeps its memory from pair to pair.
 class Geometry {
  public:
@@ -73,10 +89,32 @@ class Geometry {
     return static_cast<int>(distinct_.size());
   }
 
+  double explained_share(const Features& query, std::span<const Match> inliers) {
+    if (inliers.empty()) return 0;
+    x_px_.clear();
+    y_px_.clear();
+    for (const Match& match : inliers) {
+      x_px_.push_back(keypoint(query, match.query).x_px);
+      y_px_.push_back(keypoint(query, match.query).y_px);
+    }
+    const Range x = middle(x_px_);
+    const Range y = middle(y_px_);
+    const auto is_amid = [&](const Keypoint& k) {
+      return x.contains(k.x_px) && y.contains(k.y_px);
+    };
+    const auto features = std::count_if(query.keypoints.begin(), query.keypoints.end(), is_amid);
+    const auto explained = std::count_if(inliers.begin(), inliers.end(), [&](const Match& match) {
+      return is_amid(keypoint(query, match.query));
+    });
+    return features == 0 ? 0 : static_cast<double>(explained) / static_cast<double>(features);
+  }
+
  private:
   EpipolarRansac ransac_;
   std::vector<EpipolarRansac::Pair> pairs_;
   std::vector<Match> distinct_;
+  std::vector<float> x_px_;
+  std::vector<float> y_px_;
 };
 
 }  // namespace
@@ -90,21 +128,26 @@ class Verifier::Impl {
 
   void match(const Features& query, const Features& place, Verification& result) {
     matcher_.match(query, place, options_.max_ratio, result.matches);
-    result.inliers.clear();
-    result.distinct_inliers = 0;
+    clear_geometry(result);
   }
 
   void find_geometry(const Features& query, const Features& place, Verification& result) {
-    result.inliers.clear();
-    result.distinct_inliers = 0;
+    clear_geometry(result);
     if (result.matches.size() < static_cast<std::size_t>(options_.min_matches)) return;
     geometry_.find_inliers(query, place, result.matches, options_.max_epipolar_error_px,
                            result.inliers);
     result.distinct_inliers =
         geometry_.count_distinct(query, place, result.inliers, options_.min_spacing_scales);
+    result.explained_share = geometry_.explained_share(query, result.inliers);
   }
 
  private:
+  static void clear_geometry(Verification& result) {
+    result.inliers.clear();
+    result.distinct_inliers = 0;
+    result.explained_share = 0;
+  }
+
   VerificationOptions options_;
   FeatureMatcher matcher_;
   Geometry geometry_;
@@ -140,6 +183,10 @@ std::vector<Match> epipolar_inliers(const Features& query, const Features& place
 int distinct_inliers(const Features& query, const Features& place,
                      const std::vector<Match>& inliers, double min_spacing_scales) {
   return Geometry().count_distinct(query, place, inliers, min_spacing_scales);
+}
+
+double explained_share(const Features& query, const std::vector<Match>& inliers) {
+  return Geometry().explained_share(query, inliers);
 }
 
 Verification verify(const Features& query, const Features& place,

@@ -28,6 +28,7 @@ const kStatuses = [
   "few_matches",
   "no_geometry",
   "low_score",
+  "ambiguous",
   "unreadable",
 ];
 const kSteps = ["content", "retrieval", "features", "verification"];

@@ -18,12 +18,13 @@ enum class Status {
   few_matches,       ///< candidates, but none shares enough features with the query
   no_geometry,       ///< features are shared, but no epipolar geometry explains enough of them
   low_score,         ///< a geometry, but too little evidence to accept the match
+  ambiguous,         ///< enough evidence, but for other places that share it, which look alike
   unreadable,        ///< there was no usable image
 };
 
 inline constexpr std::array kAllStatuses{
     Status::loop,        Status::no_earlier_place, Status::no_similar_place, Status::few_matches,
-    Status::no_geometry, Status::low_score,        Status::unreadable};
+    Status::no_geometry, Status::low_score,        Status::ambiguous,        Status::unreadable};
 
 /// "loop", "no_earlier_place", ...: the enumerator's name, as it stands in loops.csv.
 std::string_view to_string(Status status);

@@ -40,23 +40,38 @@ struct ExclusionOptions {
 
 /// The one rule that accepts a match: score >= min_score.
 struct DecisionOptions {
-  double min_score = 22.0;
-  int agreement_steps = 2;
-  double agreement_weight = 0.5;
-  int chance_inliers = 8;
+  double min_score = 18.0;
+  double full_share = 0.1;
+  int full_steps = 200;
+  bool distinctness = true;
+  double chance_evidence = 10.0;
+  double agreement_weight = 0.4;
+  double agreement_memory = 0.8;
+  bool count_matches = false;
 
   static constexpr auto fields() {
     using S = DecisionOptions;
     return std::tuple{
         Field{"min_score", &S::min_score, 1.0, 1e9, "smallest score of an accepted match"},
-        Field{"agreement_steps", &S::agreement_steps, 0, 100,
-              "changes of view just before the query that can support its match; 0 = each frame "
-              "alone"},
+        Field{
+            "full_share", &S::full_share, 0.0, 1.0,
+            "inliers count in full where they are this part of the features amid them, and by the "
+            "root of the part where it is less; 0 = always"},
+        Field{"full_steps", &S::full_steps, 1, 1'000'000,
+              "inliers count in full once the map holds so many changes of view, and before by its "
+              "logarithm; 1 = always"},
+        switch_field("distinctness", &S::distinctness,
+                     "an inlier counts less if other places have it, too"),
+        Field{"chance_evidence", &S::chance_evidence, 0.0, 1000.0,
+              "evidence that different places show by chance; no more supports nothing"},
         Field{"agreement_weight", &S::agreement_weight, 0.0, 1.0,
-              "what a supporting view's distinct inlier adds to the score; one of the query's "
-              "adds 1"},
-        Field{"chance_inliers", &S::chance_inliers, 0, 100,
-              "distinct inliers that different places share by chance; fewer support nothing"}};
+              "what the support of the changes of view before adds to the score; 0 = each frame "
+              "alone"},
+        Field{"agreement_memory", &S::agreement_memory, 0.0, 0.99,
+              "part of the support that is left after each further change of view"},
+        switch_field("count_matches", &S::count_matches,
+                     "the evidence is the number of matches alone, without geometry, as in the "
+                     "paper")};
   }
 };
 

@@ -16,6 +16,8 @@ const kMeanings: Record<string, string> = {
     "Features match, but not as one rigid scene: look-alike texture, or things that move.",
   low_score:
     "There is a geometry, but too little evidence: a new place, or an overlap too small to be sure.",
+  ambiguous:
+    "There is enough evidence, but other places share it: they look alike, and cannot be told apart.",
   unreadable: "The image is damaged, of another size, or no image.",
 };
 

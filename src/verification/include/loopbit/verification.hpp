@@ -47,6 +47,7 @@ struct Verification {
   std::vector<Match> matches;  ///< one to one
   std::vector<Match> inliers;  ///< those that one epipolar geometry explains
   int distinct_inliers = 0;    ///< see distinct_inliers()
+  double explained_share = 0;  ///< see explained_share()
 };
 
 /// Mutual best matches by the distance of descriptors that pass the ratio test from either side;
@@ -69,6 +70,12 @@ std::vector<Match> epipolar_inliers(const Features& query, const Features& place
 /// crossing) has many of them, so they are not independent evidence.
 int distinct_inliers(const Features& query, const Features& place,
                      const std::vector<Match>& inliers, double min_spacing_scales);
+
+/// The part of the query's features amid `inliers` that are inliers themselves, 0 to 1; 0 without
+/// any. Amid: within the middle 80 % of the inliers' x and of their y. Of a place seen again, a
+/// tenth or more is found again; where only a door of the same make was found, most of what
+/// surrounds it is left unexplained. Cost: linear in the features.
+double explained_share(const Features& query, const std::vector<Match>& inliers);
 
 /// Step 3 for one pair after another in two halves, so that the second can be left out. Its memory
 /// is kept: once it has seen the largest pair, nothing is allocated but what `result` lacks. Not
@@ -95,7 +102,7 @@ class Verifier {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Step 3 for one candidate: match_features, epipolar_inliers, distinct_inliers.
+/// Step 3 for one candidate: match_features, epipolar_inliers, distinct_inliers, explained_share.
 Verification verify(const Features& query, const Features& place,
                     const VerificationOptions& options = {});
 

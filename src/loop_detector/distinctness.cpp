@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "distinctness.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <limits>
+
+namespace loopbit {
+namespace {
+
+constexpr std::ptrdiff_t kSamePlaceSteps = 6;
+
+bool is_same_place(const Sighting& a, const Sighting& b) {
+  return std::abs(a.step - b.step) < kSamePlaceSteps ||
+         std::abs(a.first_visit - b.first_visit) < kSamePlaceSteps;
+}
+
+/// In how many other places a feature of the query was found.
+struct Places {
+  int count = 0;
+  int latest = 0;  ///< the number of the last one, from 1
+};
+
+}  // namespace
+
+double distinctness(const Sighting& sighting, const std::vector<Sighting>& all) {
+  if (sighting.inliers.empty()) return 1;
+  std::vector<Places> found;
+  int place = 0;
+  std::ptrdiff_t latest_visit = std::numeric_limits<std::ptrdiff_t>::min() / 2;
+  for (const Sighting& other : all) {
+    if (is_same_place(other, sighting)) continue;
+    if (other.first_visit - latest_visit >= kSamePlaceSteps) ++place;
+    latest_visit = other.first_visit;
+    for (const Match& match : other.inliers) {
+      const auto feature = static_cast<std::size_t>(match.query);
+      if (feature >= found.size()) found.resize(feature + 1);
+      if (found[feature].latest == place) continue;
+      found[feature] = {found[feature].count + 1, place};
+    }
+  }
+  double sum = 0;
+  for (const Match& match : sighting.inliers) {
+    const auto feature = static_cast<std::size_t>(match.query);
+    sum += feature < found.size() ? 1.0 / (1 + found[feature].count) : 1.0;
+  }
+  return sum / static_cast<double>(sighting.inliers.size());
+}
+
+}  // namespace loopbit

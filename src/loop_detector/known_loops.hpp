@@ -1,0 +1,26 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <map>
+
+namespace loopbit {
+
+/// The loops found so far, as knowledge of which stretches of the path are laps through one place.
+/// Places that look alike are a warning, laps through one place are not; what tells them apart is
+/// that each lap, when it was driven, was found to be a revisit.
+class KnownLoops {
+ public:
+  /// A step of the path was found to show the same place as an earlier one.
+  void add(std::ptrdiff_t step, std::ptrdiff_t earlier_step);
+
+  /// The step of the first visit to the place that `step` shows, as far as loops at most 10 steps
+  /// away tell; else `step` itself. Logarithmic in the loops.
+  [[nodiscard]] std::ptrdiff_t first_visit(std::ptrdiff_t step) const;
+
+ private:
+  std::map<std::ptrdiff_t, std::ptrdiff_t> first_visits_;  ///< by step
+};
+
+}  // namespace loopbit
