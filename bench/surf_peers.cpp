@@ -8,7 +8,6 @@
 #include <dlib/image_keypoint/hessian_pyramid.h>
 #include <dlib/image_keypoint/surf.h>
 #include <dlib/opencv.h>
-#include <opencv2/features2d.hpp>
 
 namespace loopbit::bench {
 namespace {
@@ -57,13 +56,6 @@ Features dlib_surf(const cv::Mat1b& gray, int max_keypoints, bool upright) {
                                   static_cast<float>(point.scale), static_cast<float>(angle)});
     if (point.laplacian >= 0) ++features.num_dark;
   }
-  return features;
-}
-
-OrbFeatures orb(const cv::Mat1b& gray, int max_keypoints) {
-  OrbFeatures features;
-  cv::ORB::create(max_keypoints)
-      ->detectAndCompute(gray, cv::noArray(), features.keypoints, features.descriptors);
   return features;
 }
 

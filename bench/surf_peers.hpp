@@ -12,11 +12,4 @@ namespace loopbit::bench {
 /// image, in our format.
 Features dlib_surf(const cv::Mat1b& gray, int max_keypoints, bool upright);
 
-/// OpenCV's ORB with its defaults but for the number of keypoints.
-struct OrbFeatures {
-  std::vector<cv::KeyPoint> keypoints;
-  cv::Mat descriptors;
-};
-OrbFeatures orb(const cv::Mat1b& gray, int max_keypoints);
-
 }  // namespace loopbit::bench

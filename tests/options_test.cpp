@@ -261,6 +261,19 @@ TEST(ListOptions, TellsNameDefaultRangeAndMeaning) {
   EXPECT_NE(find("exclusion.seconds").help.find("seconds"), std::string::npos);
 }
 
+// Presets
+
+TEST(Presets, AreValid) {
+  for (const std::string_view name : kPresets) EXPECT_NO_THROW(validate(preset(name))) << name;
+  EXPECT_EQ(to_json(preset("default")), to_json({}));
+  EXPECT_TRUE(preset("paper").decision.count_matches);
+}
+
+TEST(Presets, UnknownNameIsToldTheKnownOnes) {
+  expect_error(ErrorKind::option, {"'papers'", "default paper"},
+               [] { static_cast<void>(preset("papers")); });
+}
+
 // JSON
 
 /// Every setting differs from its default.

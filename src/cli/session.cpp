@@ -93,8 +93,12 @@ void SessionFlags::add_to(CLI::App& command) {
                   "Continue this map, made if there is none: earlier sessions' places are "
                   "recognised, too")
       ->type_name("MAP.db");
+  CLI::Option* named =
+      command.add_option("--preset", preset, "Named settings to begin with: default or paper")
+          ->type_name("NAME");
   command.add_option("--config", config, "Settings file, JSON; see 'loopbit options --json'")
-      ->type_name("FILE");
+      ->type_name("FILE")
+      ->excludes(named);
   command
       .add_option("--set", settings, "One setting, such as surf.max_keypoints=500; may be repeated")
       ->type_name("NAME=VALUE")
@@ -116,7 +120,7 @@ void add_report_flag(CLI::App& command, ReportOptions& options) {
 }
 
 LoopDetectorOptions SessionFlags::detector_options() const {
-  LoopDetectorOptions options = config.empty() ? LoopDetectorOptions{} : load_options(config);
+  LoopDetectorOptions options = config.empty() ? loopbit::preset(preset) : load_options(config);
   for (const std::string& setting : settings) {
     const auto [name, value] = split_setting(setting);
     set_option(options, name, value);

@@ -24,6 +24,7 @@ struct SessionFlags {
   std::string out;  ///< empty = beside the map, named after it
   std::string map;  ///< empty = none
   bool overwrite = false;
+  std::string preset = "default";
   std::string config;
   std::vector<std::string> settings;  ///< "section.field=value"
   int threads = 0;                    ///< 0 = one a core

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "loopbit/error.hpp"
@@ -53,6 +54,25 @@ void set_all(LoopDetectorOptions& options, const Json& json) {
 }
 
 }  // namespace
+
+LoopDetectorOptions preset(std::string_view name) {
+  LoopDetectorOptions options;
+  if (name == "default") return options;
+  if (name != "paper") {
+    throw Error(ErrorKind::option, fmt::format("There is no preset '{}'; the presets are: {}.",
+                                               name, fmt::join(kPresets, " ")));
+  }
+  options.retrieval = {.max_candidates = 1000,
+                       .min_similarity = 0.5,
+                       .shift_tolerance_columns = 0,
+                       .min_spacing = 1,
+                       .max_center_distance_px = 4};
+  options.surf.upright = false;
+  options.decision.min_score = 30;
+  options.decision.agreement_weight = 0;
+  options.decision.count_matches = true;
+  return options;
+}
 
 void validate(const LoopDetectorOptions& options) {
   for_each_section(options,

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <vector>
 
@@ -95,6 +97,15 @@ void for_each_section(Options& options, Visit&& visit) {
   visit("exclusion", options.exclusion);
   visit("decision", options.decision);
 }
+
+/// The names that preset() knows.
+inline constexpr std::array<std::string_view, 2> kPresets{"default", "paper"};
+
+/// `default`: LoopDetectorOptions{}. `paper`: the pipeline of Wang et al. 2019 as published, to
+/// compare with: every earlier place beyond a fixed xi and with a near enough centre M is matched
+/// with rotated SURF, and their number decides, without geometry or agreement. The paper names no
+/// values; those here are ours. Throws Error (kind option) for other names.
+LoopDetectorOptions preset(std::string_view name);
 
 /// Throws Error for the first setting out of its range, and where two settings contradict.
 void validate(const LoopDetectorOptions& options);
