@@ -73,9 +73,9 @@ void PrunedSearch::prepare_shifts(const BinaryContent& query, int tolerance_colu
 }
 
 std::vector<Candidate> PrunedSearch::run() {
-  search_tail();
   bound_coarse_stretches();
   search_coarse_stretches();
+  search_tail();
   return std::move(found_).answer();
 }
 

@@ -92,9 +92,9 @@ struct Kernels {
                               const std::uint8_t* groups, std::size_t num_groups,
                               std::uint16_t* sums, std::uint16_t* largest);
 
-  /// numbers[0], numbers[1], ... = those i, in order, for which sums[i] is at least `lower` and below
-  /// `upper`, at most 32,768 both; returns how many there are. num_sums is a multiple of 16, and
-  /// `numbers` has room for all.
+  /// numbers[0], numbers[1], ... = those i, in order, for which sums[i] is at least `lower` and
+  /// below `upper`, both at most 32,767; returns how many there are. num_sums is a multiple of 16,
+  /// and `numbers` has room for all.
   std::size_t (*select_sums)(const std::uint16_t* sums, std::size_t num_sums, std::uint16_t lower,
                              std::uint16_t upper, std::uint32_t* numbers);
 
