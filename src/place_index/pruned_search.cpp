@@ -109,8 +109,9 @@ void PrunedSearch::bound_coarse_stretches() {
 /// the bounds of the rest. Batches by sum, each in the order of places, take less time than sorting
 /// all.
 void PrunedSearch::search_coarse_stretches() {
+  constexpr std::size_t kMaxSum = std::size_t{kContentSide} * kContentSide;
   constexpr std::size_t kSumsPerBucket = 4;
-  std::array<std::uint32_t, kContentSide * kContentSide / kSumsPerBucket + 1> sizes{};
+  std::array<std::uint32_t, kMaxSum / kSumsPerBucket + 1> sizes{};
   for (std::size_t i = 0; i < num_groups_; ++i) ++sizes[largest_sums_[i] / kSumsPerBucket];
 
   std::size_t wanted = kFirstBatch;
