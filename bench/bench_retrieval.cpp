@@ -162,7 +162,7 @@ struct Row {
 
 void print_kind(const char* kind, std::size_t places, const Asked& asked) {
   fmt::print(
-      "  {} places={} p50_ms={:.3f} p99_ms={:.3f} bounds_512={} bounds_32={} bounds_8={} "
+      "  {} places={} p50_ms={:.3f} p99_ms={:.3f} bounds_32={} bounds_16={} bounds_8={} "
       "bounds_2={} contents={}\n",
       kind, places, percentile(asked.ms, 0.5), percentile(asked.ms, 0.99), asked.mean.stretches[0],
       asked.mean.stretches[1], asked.mean.stretches[2], asked.mean.stretches[3],

@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdlib>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -96,21 +97,80 @@ Neighbours expected_neighbours(const Bytes& descriptors, const Bytes& others) {
   return expected;
 }
 
-/// Counts as blocks have them, or up to the largest a kernel may be given.
-std::vector<std::uint8_t> random_counts(Random& random, std::size_t records, int largest) {
-  std::vector<std::uint8_t> counts(records * kBlockCounts);
+using Counts = std::vector<std::uint8_t>;  // of several records, one after the other
+
+Counts random_counts(Random& random, std::size_t num_counts, int largest) {
+  Counts counts(num_counts);
   std::generate(counts.begin(), counts.end(),
                 [&] { return static_cast<std::uint8_t>(random.between(0, largest)); });
   return counts;
 }
 
-std::vector<std::uint16_t> max_min_sums(const Kernels& kernels,
-                                        const std::vector<std::uint8_t>& queries,
-                                        const std::vector<std::uint8_t>& records) {
-  std::vector<std::uint16_t> largest(records.size() / kBlockCounts, 9999);
-  kernels.max_min_sums(queries.data(), queries.size() / kBlockCounts, records.data(),
-                       largest.size(), largest.data());
-  return largest;
+/// Records of `size` counts side by side, `width` of them, `at_once` counts of each in turn.
+Counts interleaved(const Counts& records, std::size_t size, std::size_t width,
+                   std::size_t at_once) {
+  Counts result(records.size());
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    const std::size_t record = i / size;
+    const std::size_t k = i % size;
+    const std::size_t column = record % width * at_once + k % at_once;
+    result[record / width * width * size + k / at_once * at_once * width + column] = records[i];
+  }
+  return result;
+}
+
+int sum_of_minima(const Counts& queries, std::size_t q, const Counts& records, std::size_t i,
+                  std::size_t size) {
+  int sum = 0;
+  for (std::size_t k = 0; k < size; ++k) {
+    sum += std::min(queries[q * size + k], records[i * size + k]);
+  }
+  return sum;
+}
+
+/// What reaching_queries finds, from its definition; `records` are one after the other.
+void expect_reaching_queries(const Kernels& kernels, const Counts& queries, std::uint32_t among,
+                             const Counts& records, const std::vector<std::uint16_t>& least) {
+  const std::size_t num_records = records.size() / kBlockCounts;
+  std::vector<std::uint16_t> largest(num_records, 9999);
+  std::vector<std::uint16_t> reaching(num_records, 9999);
+  const Counts pairs = interleaved(records, kBlockCounts, 2, kPairedCounts);
+  kernels.reaching_queries(queries.data(), among, pairs.data(), num_records / 2, least.data(),
+                           largest.data(), reaching.data());
+  for (std::size_t i = 0; i < num_records; ++i) {
+    int expected_largest = 0;
+    unsigned expected = 0;
+    for (std::size_t q = 0; q < queries.size() / kBlockCounts; ++q) {
+      if ((among >> q & 1U) == 0) continue;
+      const int sum = sum_of_minima(queries, q, records, i, kBlockCounts);
+      expected_largest = std::max(expected_largest, sum);
+      if (sum >= least[i]) expected |= 1U << q;
+    }
+    ASSERT_EQ(largest[i], expected_largest) << "record " << i << " among " << among;
+    ASSERT_EQ(reaching[i], expected) << "record " << i << " among " << among;
+  }
+}
+
+/// What largest_coarse_sums finds, from its definition.
+void expect_largest_coarse_sums(const Kernels& kernels, const Counts& queries,
+                                const Counts& records) {
+  const std::size_t num_records = records.size() / kCoarseCounts;
+  std::vector<std::uint16_t> sums(num_records, 9999);
+  std::vector<std::uint16_t> largest(num_records / kInterleaved, 9999);
+  const Counts groups = interleaved(records, kCoarseCounts, kInterleaved, kCountsAtOnce);
+  kernels.largest_coarse_sums(queries.data(), queries.size() / kCoarseCounts, groups.data(),
+                              largest.size(), sums.data(), largest.data());
+  std::vector<std::uint16_t> expected_largest(largest.size());
+  for (std::size_t i = 0; i < num_records; ++i) {
+    int expected = 0;
+    for (std::size_t q = 0; q < queries.size() / kCoarseCounts; ++q) {
+      expected = std::max(expected, sum_of_minima(queries, q, records, i, kCoarseCounts));
+    }
+    ASSERT_EQ(sums[i], expected) << "record " << i;
+    std::uint16_t& of_group = expected_largest[i / kInterleaved];
+    of_group = std::max(of_group, sums[i]);
+  }
+  ASSERT_EQ(largest, expected_largest);
 }
 
 class EveryKernel : public testing::TestWithParam<const Kernels*> {};
@@ -236,38 +296,80 @@ TEST_P(EveryKernel, ReadsDescriptorsAtAnyByte) {
 
 TEST_P(EveryKernel, SumsTheMinimaOfEachPairOfCounts) {
   for (std::size_t k = 0; k < kBlockCounts; ++k) {
-    std::vector<std::uint8_t> one(kBlockCounts, 0);
-    one[k] = 100;
-    std::vector<std::uint8_t> rising(kBlockCounts);
-    for (std::size_t i = 0; i < kBlockCounts; ++i) rising[i] = static_cast<std::uint8_t>(i);
-    ASSERT_EQ(max_min_sums(*GetParam(), one, rising).front(), std::min<std::size_t>(k, 100));
-    ASSERT_EQ(max_min_sums(*GetParam(), rising, one).front(), std::min<std::size_t>(k, 100));
+    Counts one(2 * kBlockCounts, 0);
+    one[k] = 20;
+    one[kBlockCounts + k] = 5;
+    const Counts full(kBlockCounts, 32);
+    expect_reaching_queries(*GetParam(), full, 1, one, {20, 6});
+  }
+  for (std::size_t k = 0; k < kCoarseCounts * kInterleaved; ++k) {
+    Counts one(kCoarseCounts * kInterleaved, 0);
+    one[k] = 50;
+    expect_largest_coarse_sums(*GetParam(), Counts(kCoarseCounts, 64), one);
   }
 }
 
 TEST_P(EveryKernel, SumsTheLargestCounts) {
-  for (const std::size_t records : {1U, 4U, 5U}) {
-    const std::vector<std::uint8_t> largest(records * kBlockCounts, 127);
-    const std::vector<std::uint16_t> sums(records, 127 * kBlockCounts);
-    EXPECT_EQ(max_min_sums(*GetParam(), largest, largest), sums);
-    EXPECT_EQ(max_min_sums(*GetParam(), {}, largest), std::vector<std::uint16_t>(records, 0));
-    EXPECT_TRUE(max_min_sums(*GetParam(), largest, {}).empty());
-  }
+  const Counts full(4 * kBlockCounts, 32);
+  expect_reaching_queries(*GetParam(), full, 0b1111, full, {4096, 4095, 4097, 0});
+  expect_reaching_queries(*GetParam(), full, 0, full, {0, 1, 2, 3});
+  const Counts full_groups(2 * kInterleaved * kCoarseCounts, 64);
+  expect_largest_coarse_sums(*GetParam(), Counts(3 * kCoarseCounts, 64), full_groups);
+  expect_largest_coarse_sums(*GetParam(), {}, full_groups);
+  expect_largest_coarse_sums(*GetParam(), full, {});
 }
 
-TEST_P(EveryKernel, SumsOfMinimaEqualTheScalarOnes) {
+TEST_P(EveryKernel, FindsTheQueriesThatReachWhatARecordNeeds) {
   Random random;
-  for (const int largest : {3, 32, 127}) {
-    for (const std::size_t num_queries : {1U, 2U, 3U, 4U, 5U, 9U, 65U}) {
-      for (const std::size_t num_records : {1U, 2U, 3U, 4U, 5U, 16U, 33U}) {
-        const auto queries = random_counts(random, num_queries, largest);
-        const auto records = random_counts(random, num_records, largest);
-        ASSERT_EQ(max_min_sums(*GetParam(), queries, records),
-                  max_min_sums(scalar(), queries, records))
-            << num_queries << " queries, " << num_records << " records, up to " << largest;
+  for (const int largest : {3, 32}) {
+    for (const std::size_t num_pairs : {1U, 2U, 3U, 8U}) {
+      for (const std::uint32_t among : {0x1U, 0x1FFU, 0x124U, 0x8001U, 0xFFFFU}) {
+        const Counts queries = random_counts(random, 16 * kBlockCounts, largest);
+        const Counts records = random_counts(random, 2 * num_pairs * kBlockCounts, largest);
+        std::vector<std::uint16_t> least(2 * num_pairs);
+        // Some records need just what one of the queries has.
+        for (std::size_t i = 0; i < least.size(); ++i) {
+          least[i] = static_cast<std::uint16_t>(
+              sum_of_minima(queries, i % 9, records, i, kBlockCounts) + random.between(0, 1));
+        }
+        expect_reaching_queries(*GetParam(), queries, among, records, least);
       }
     }
   }
+}
+
+TEST_P(EveryKernel, FindsTheLargestCoarseSums) {
+  Random random;
+  for (const int largest : {3, 64}) {
+    for (const std::size_t num_queries : {1U, 2U, 3U, 4U, 9U, 16U}) {
+      for (const std::size_t num_groups : {1U, 2U, 5U}) {
+        expect_largest_coarse_sums(
+            *GetParam(), random_counts(random, num_queries * kCoarseCounts, largest),
+            random_counts(random, num_groups * kInterleaved * kCoarseCounts, largest));
+      }
+    }
+  }
+}
+
+TEST_P(EveryKernel, SelectsTheSumsWithinLimits) {
+  Random random;
+  std::vector<std::uint16_t> sums(80);
+  std::generate(sums.begin(), sums.end(),
+                [&] { return static_cast<std::uint16_t>(random.between(0, 4096)); });
+  sums[17] = 1;
+  sums[18] = 4096;
+  for (const auto& [lower, upper] : {std::pair{1, 4097}, {1, 1}, {2000, 3000}, {4096, 4097}}) {
+    std::vector<std::uint32_t> expected;
+    for (std::uint32_t i = 0; i < sums.size(); ++i) {
+      if (sums[i] >= lower && sums[i] < upper) expected.push_back(i);
+    }
+    std::vector<std::uint32_t> numbers(sums.size());
+    numbers.resize(GetParam()->select_sums(sums.data(), sums.size(),
+                                           static_cast<std::uint16_t>(lower),
+                                           static_cast<std::uint16_t>(upper), numbers.data()));
+    EXPECT_EQ(numbers, expected) << lower << " to " << upper;
+  }
+  EXPECT_EQ(GetParam()->select_sums(nullptr, 0, 1, 2, nullptr), 0U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, EveryKernel,

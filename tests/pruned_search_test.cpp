@@ -32,6 +32,7 @@ std::vector<RetrievalOptions> some_options() {
       {.max_candidates = 5, .shift_tolerance_columns = 32, .min_spacing = 40},
       {.max_candidates = 3, .min_similarity = 0.0, .min_spacing = 1000},
       {.max_candidates = 7, .shift_tolerance_columns = 2, .max_count_difference = 60},
+      {.max_candidates = 9, .shift_tolerance_columns = 8},
       {.min_similarity = 0.0, .max_center_distance_px = 0.8},
   };
 }
@@ -155,6 +156,32 @@ TEST(FoundPlaces, LeaveOutWhatNoOrderOfThePlacesCanBring) {
   EXPECT_TRUE(found.may_matter(0.701, 1'000));
 }
 
+TEST(FoundPlaces, NeedAsMuchOverlapAsTheFloorHas) {
+  for (const double floor : {0.0, 0.2, 0.5, 1.0 / 3.0, 0.7, 1.0}) {
+    const FoundPlaces found({.min_similarity = floor});
+    for (int larger = 1; larger <= 4096; ++larger) {
+      const int least = found.least_overlap(larger);
+      ASSERT_FALSE(found.may_matter((least - 1.0) / larger, 0)) << floor << ' ' << larger;
+      ASSERT_TRUE(found.may_matter((least + 1.0) / larger, 0)) << floor << ' ' << larger;
+      for (const int overlap : {least - 1, least, least + 1}) {
+        ASSERT_EQ(found.may_matter(overlap, larger, 0),
+                  found.may_matter(static_cast<double>(overlap) / larger, 0))
+            << floor << ' ' << overlap << " of " << larger;
+      }
+    }
+  }
+}
+
+TEST(PrunedSearch, OfEqualPlacesLooksAtFew) {
+  Random random;
+  const BinaryContent content = random_content(random, 0.3);
+  PlaceStore store;
+  add_all(store, Contents(5'000, content));
+  PrunedSearch search(store, store.size(), content, {}, active_kernels());
+  EXPECT_EQ(search.run().size(), 20U);
+  EXPECT_LT(search.work().contents, 500);
+}
+
 TEST(BlockCounts, BoundTheOverlap) {
   Random random;
   for (int i = 0; i < 200; ++i) {
@@ -168,8 +195,18 @@ TEST(BlockCounts, BoundTheOverlap) {
       sum += of_a.of[k];
       bound += std::min(of_a.of[k], of_b.of[k]);
     }
+    const CoarseCounts coarse_a = coarse_counts(of_a);
+    const CoarseCounts coarse_b = coarse_counts(of_b);
+    int coarse_sum = 0;
+    int coarse_bound = 0;
+    for (std::size_t k = 0; k < coarse_a.of.size(); ++k) {
+      coarse_sum += coarse_a.of[k];
+      coarse_bound += std::min(coarse_a.of[k], coarse_b.of[k]);
+    }
     EXPECT_EQ(sum, count(a));
+    EXPECT_EQ(coarse_sum, count(a));
     EXPECT_GE(bound, similarity(a, b) * std::max(count(a), count(b)));
+    EXPECT_GE(coarse_bound, bound);
   }
 }
 

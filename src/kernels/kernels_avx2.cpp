@@ -4,6 +4,7 @@
 #include <immintrin.h>
 
 #include "kernel_variants.hpp"
+#include "min_sums_x86.hpp"
 #include "surf_loops.inc"
 
 namespace loopbit {
@@ -154,75 +155,100 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   }
 }
 
-struct Counts {
-  __m256i parts[4];
+/// Two records of block counts. Four minima of at most 32 fit in 8 bits.
+struct Pair {
+  struct Lanes {
+    __m256i first;
+    __m256i second;
+  };
+
+  const std::uint8_t* counts;
+
+  static Pair load(const std::uint8_t* pair) { return {pair}; }
+
+  void add_min_sums(const std::uint8_t* query, Lanes& lanes) const {
+    const auto beside = [&](__m256i sums, std::size_t record) {
+      const auto minimum = [&](std::size_t first) {
+        return _mm256_min_epu8(loopbit::load(counts + 2 * first + record * kPairedCounts),
+                               loopbit::load(query + first));
+      };
+      const __m256i minima =
+          _mm256_add_epi8(_mm256_add_epi8(minimum(0), minimum(kPairedCounts)),
+                          _mm256_add_epi8(minimum(2 * kPairedCounts), minimum(3 * kPairedCounts)));
+      return _mm256_or_si256(_mm256_slli_epi64(sums, 16),
+                             _mm256_sad_epu8(minima, _mm256_setzero_si256()));
+    };
+    lanes = {beside(lanes.first, 0), beside(lanes.second, 1)};
+  }
+
+  static __m128i reduce(const Lanes& lanes) {
+    const auto half = [](__m256i sums) {
+      return _mm_add_epi16(_mm256_castsi256_si128(sums), _mm256_extracti128_si256(sums, 1));
+    };
+    const __m128i first = half(lanes.first);
+    const __m128i second = half(lanes.second);
+    return _mm_add_epi16(_mm_unpacklo_epi64(first, second), _mm_unpackhi_epi64(first, second));
+  }
 };
 
-Counts load_counts(const std::uint8_t* counts) {
-  return {{load(counts), load(counts + 32), load(counts + 64), load(counts + 96)}};
+// Coarse counts: 16 records side by side, in two halves. Two minima of at most 64 fit in 8 bits,
+// the sum of all of a record in 16.
+
+__m256i four_counts(const std::uint8_t* query, std::size_t first) {
+  std::int32_t bytes = 0;
+  __builtin_memcpy(&bytes, query + first, sizeof bytes);
+  return _mm256_set1_epi32(bytes);
 }
 
-/// The sum of the minima, in four parts.
-__m256i min_sum_lanes(const Counts& a, const Counts& b) {
-  const auto minimum = [&](int part) { return _mm256_min_epu8(a.parts[part], b.parts[part]); };
-  const __m256i low = _mm256_add_epi8(minimum(0), minimum(1));
-  const __m256i high = _mm256_add_epi8(minimum(2), minimum(3));
-  const __m256i zero = _mm256_setzero_si256();
-  return _mm256_add_epi64(_mm256_sad_epu8(low, zero), _mm256_sad_epu8(high, zero));
-}
-
-/// The sums with four records that follow each other, in the low four of the 16-bit lanes: side by
-/// side, one reduction serves them all.
-__m128i min_sums_with_four(const Counts& a, const std::uint8_t* records) {
-  const auto lanes = [&](std::size_t i) {
-    return min_sum_lanes(a, load_counts(records + i * kBlockCounts));
-  };
-  const __m256i low = _mm256_or_si256(lanes(0), _mm256_slli_epi64(lanes(1), 16));
-  const __m256i high =
-      _mm256_or_si256(_mm256_slli_epi64(lanes(2), 32), _mm256_slli_epi64(lanes(3), 48));
-  const __m256i all = _mm256_or_si256(low, high);
-  const __m128i sum = _mm_add_epi16(_mm256_castsi256_si128(all), _mm256_extracti128_si256(all, 1));
-  return _mm_add_epi16(sum, _mm_unpackhi_epi64(sum, _mm_setzero_si128()));
-}
-
-/// The largest sum of several queries with one record, four queries at a time.
-std::uint16_t max_min_sum(const std::uint8_t* queries, std::size_t num_queries,
-                          const std::uint8_t* record) {
-  const Counts counts = load_counts(record);
-  __m128i best = _mm_setzero_si128();
-  std::size_t q = 0;
-  for (; q + 4 <= num_queries; q += 4) {
-    best = _mm_max_epu16(best, min_sums_with_four(counts, queries + q * kBlockCounts));
+/// The sums of the minima of a query with 8 records, in 32-bit lanes.
+__m256i coarse_sums_with_eight(const std::uint8_t* query, const std::uint8_t* half) {
+  constexpr std::size_t kStride = kInterleaved * kCountsAtOnce;
+  __m256i sums = _mm256_setzero_si256();
+  for (std::size_t first = 0; first < kCoarseCounts; first += 2 * kCountsAtOnce) {
+    const std::uint8_t* counts = half + first * kInterleaved;
+    const __m256i low = _mm256_min_epu8(load(counts), four_counts(query, first));
+    const __m256i high =
+        _mm256_min_epu8(load(counts + kStride), four_counts(query, first + kCountsAtOnce));
+    const __m256i both = _mm256_add_epi8(low, high);
+    sums = _mm256_add_epi16(sums, _mm256_maddubs_epi16(both, _mm256_set1_epi8(1)));
   }
-  for (; q < num_queries; ++q) {
-    const __m256i lanes = min_sum_lanes(counts, load_counts(queries + q * kBlockCounts));
-    best = _mm_max_epu16(best, _mm_cvtsi32_si128(sum_lanes_epi64(lanes)));
-  }
-  best = _mm_max_epu16(best, _mm_srli_epi64(best, 32));
-  best = _mm_max_epu16(best, _mm_srli_epi64(best, 16));
-  return static_cast<std::uint16_t>(_mm_extract_epi16(best, 0));
+  return _mm256_madd_epi16(sums, _mm256_set1_epi16(1));
 }
 
-void max_min_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* records,
-                  std::size_t num_records, std::uint16_t* largest) {
-  std::size_t i = 0;
-  for (; i + 4 <= num_records; i += 4) {
-    __m128i best = _mm_setzero_si128();
+void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
+                         const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
+                         std::uint16_t* largest) {
+  constexpr std::size_t kHalf = kInterleaved / 2 * kCountsAtOnce;
+  for (std::size_t group = 0; group < num_groups; ++group) {
+    const std::uint8_t* counts = groups + group * kInterleaved * kCoarseCounts;
+    __m256i low = _mm256_setzero_si256();
+    __m256i high = _mm256_setzero_si256();
     for (std::size_t q = 0; q < num_queries; ++q) {
-      const Counts query = load_counts(queries + q * kBlockCounts);
-      best = _mm_max_epu16(best, min_sums_with_four(query, records + i * kBlockCounts));
+      const std::uint8_t* query = queries + q * kCoarseCounts;
+      low = _mm256_max_epi32(low, coarse_sums_with_eight(query, counts));
+      high = _mm256_max_epi32(high, coarse_sums_with_eight(query, counts + kHalf));
     }
-    _mm_storel_epi64(reinterpret_cast<__m128i*>(largest + i), best);
-  }
-  for (; i < num_records; ++i) {
-    largest[i] = max_min_sum(queries, num_queries, records + i * kBlockCounts);
+    // Packing takes halves of the registers in turn.
+    const __m256i best =
+        _mm256_permute4x64_epi64(_mm256_packus_epi32(low, high), _MM_SHUFFLE(3, 1, 2, 0));
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + group * kInterleaved), best);
+    largest[group] = largest_of_16(best);
   }
 }
 
 }  // namespace
 
-const Kernels kAvx2Kernels{
-    "avx2",       max_overlaps<overlap>, max_min_sums, describe_constants, nearest_two,
-    integral_row, hessian_row,           maxima_row,   cell_means,         describe};
+const Kernels kAvx2Kernels{"avx2",
+                           max_overlaps<overlap>,
+                           reaching_queries<Pair>,
+                           largest_coarse_sums,
+                           select_sums,
+                           describe_constants,
+                           nearest_two,
+                           integral_row,
+                           hessian_row,
+                           maxima_row,
+                           cell_means,
+                           describe};
 
 }  // namespace loopbit

@@ -5,6 +5,7 @@
 #include <immintrin.h>
 
 #include "kernel_variants.hpp"
+#include "min_sums_x86.hpp"
 #include "surf_loops.inc"
 
 namespace loopbit {
@@ -124,77 +125,96 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   _mm512_store_si512(nearest.second_distance_sq, absolute(two.second));
 }
 
-struct Counts {
-  __m512i low;
-  __m512i high;
+/// Two records of block counts, side by side. Four minima of at most 32 fit in 8 bits.
+struct Pair {
+  using Lanes = __m512i;
+  static constexpr std::size_t kParts = kBlockCounts / kPairedCounts;
+
+  __m512i parts[kParts];
+
+  static Pair load(const std::uint8_t* pair) {
+    Pair loaded;
+    for (std::size_t i = 0; i < kParts; ++i) {
+      loaded.parts[i] = _mm512_loadu_si512(pair + i * 2 * kPairedCounts);
+    }
+    return loaded;
+  }
+
+  void add_min_sums(const std::uint8_t* query, Lanes& lanes) const {
+    const auto minimum = [&](std::size_t i) {
+      const auto* counts = reinterpret_cast<const __m256i*>(query + i * kPairedCounts);
+      return _mm512_min_epu8(parts[i], _mm512_broadcast_i64x4(_mm256_loadu_si256(counts)));
+    };
+    const __m512i minima = _mm512_add_epi8(_mm512_add_epi8(minimum(0), minimum(1)),
+                                           _mm512_add_epi8(minimum(2), minimum(3)));
+    lanes = _mm512_or_si512(_mm512_slli_epi64(lanes, 16),
+                            _mm512_sad_epu8(minima, _mm512_setzero_si512()));
+  }
+
+  static __m128i reduce(Lanes lanes) {
+    const __m512i swapped = _mm512_shuffle_i64x2(lanes, lanes, _MM_SHUFFLE(2, 3, 0, 1));
+    const __m512i sums = _mm512_add_epi16(lanes, swapped);
+    const __m128i first = _mm512_castsi512_si128(sums);
+    const __m128i second = _mm512_extracti64x2_epi64(sums, 2);
+    return _mm_add_epi16(_mm_unpacklo_epi64(first, second), _mm_unpackhi_epi64(first, second));
+  }
 };
 
-Counts load_counts(const std::uint8_t* counts) {
-  return {_mm512_loadu_si512(counts), _mm512_loadu_si512(counts + kBlockCounts / 2)};
-}
+// Coarse counts: 16 records side by side. Two minima of at most 64 fit in 8 bits.
 
-/// The sum of the minima, in eight parts.
-__m512i min_sum_lanes(const Counts& a, const Counts& b) {
-  const __m512i minima =
-      _mm512_add_epi8(_mm512_min_epu8(a.low, b.low), _mm512_min_epu8(a.high, b.high));
-  return _mm512_sad_epu8(minima, _mm512_setzero_si512());
-}
-
-/// The sums with four records that follow each other, in the low four of the 16-bit lanes: side by
-/// side, one reduction serves them all.
-__m128i min_sums_with_four(const Counts& a, const std::uint8_t* records) {
-  const auto lanes = [&](std::size_t i) {
-    return min_sum_lanes(a, load_counts(records + i * kBlockCounts));
-  };
-  const __m512i low = _mm512_or_si512(lanes(0), _mm512_slli_epi64(lanes(1), 16));
-  const __m512i high =
-      _mm512_or_si512(_mm512_slli_epi64(lanes(2), 32), _mm512_slli_epi64(lanes(3), 48));
-  const __m512i all = _mm512_or_si512(low, high);
-  const __m256i half =
-      _mm256_add_epi16(_mm512_castsi512_si256(all), _mm512_extracti64x4_epi64(all, 1));
-  const __m128i sum =
-      _mm_add_epi16(_mm256_castsi256_si128(half), _mm256_extracti128_si256(half, 1));
-  return _mm_add_epi16(sum, _mm_unpackhi_epi64(sum, _mm_setzero_si128()));
-}
-
-/// The largest sum of several queries with one record, four queries at a time.
-std::uint16_t max_min_sum(const std::uint8_t* queries, std::size_t num_queries,
-                          const std::uint8_t* record) {
-  const Counts counts = load_counts(record);
-  __m128i best = _mm_setzero_si128();
-  std::size_t q = 0;
-  for (; q + 4 <= num_queries; q += 4) {
-    best = _mm_max_epu16(best, min_sums_with_four(counts, queries + q * kBlockCounts));
-  }
-  for (; q < num_queries; ++q) {
-    const __m512i lanes = min_sum_lanes(counts, load_counts(queries + q * kBlockCounts));
-    best = _mm_max_epu16(best, _mm_cvtsi32_si128(static_cast<int>(_mm512_reduce_add_epi64(lanes))));
-  }
-  best = _mm_max_epu16(best, _mm_srli_epi64(best, 32));
-  best = _mm_max_epu16(best, _mm_srli_epi64(best, 16));
-  return static_cast<std::uint16_t>(_mm_extract_epi16(best, 0));
-}
-
-void max_min_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* records,
-                  std::size_t num_records, std::uint16_t* largest) {
-  std::size_t i = 0;
-  for (; i + 4 <= num_records; i += 4) {
-    __m128i best = _mm_setzero_si128();
-    for (std::size_t q = 0; q < num_queries; ++q) {
-      const Counts query = load_counts(queries + q * kBlockCounts);
-      best = _mm_max_epu16(best, min_sums_with_four(query, records + i * kBlockCounts));
+/// `best`, raised to the sums of the minima of Count queries with 16 records.
+template <std::size_t Count>
+__m512i larger_coarse_sums(const std::uint8_t* queries, const std::uint8_t* group, __m512i best) {
+  constexpr std::size_t kStride = kInterleaved * kCountsAtOnce;
+  __m512i sums[Count];
+  for (std::size_t q = 0; q < Count; ++q) sums[q] = _mm512_setzero_si512();
+  for (std::size_t c = 0; c < kCoarseCounts / kCountsAtOnce; c += 2) {
+    const __m512i low = _mm512_loadu_si512(group + c * kStride);
+    const __m512i high = _mm512_loadu_si512(group + (c + 1) * kStride);
+    for (std::size_t q = 0; q < Count; ++q) {
+      const auto* query = reinterpret_cast<const std::int8_t*>(queries + q * kCoarseCounts);
+      const __m512i both = _mm512_add_epi8(_mm512_min_epu8(low, chunk(query, c)),
+                                           _mm512_min_epu8(high, chunk(query, c + 1)));
+      sums[q] = _mm512_dpbusd_epi32(sums[q], both, _mm512_set1_epi8(1));
     }
-    _mm_storel_epi64(reinterpret_cast<__m128i*>(largest + i), best);
   }
-  for (; i < num_records; ++i) {
-    largest[i] = max_min_sum(queries, num_queries, records + i * kBlockCounts);
+  for (std::size_t q = 0; q < Count; ++q) best = _mm512_max_epi32(best, sums[q]);
+  return best;
+}
+
+void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
+                         const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
+                         std::uint16_t* largest) {
+  constexpr std::size_t kQueriesAtOnce = 3;
+  for (std::size_t group = 0; group < num_groups; ++group) {
+    const std::uint8_t* counts = groups + group * kInterleaved * kCoarseCounts;
+    __m512i best = _mm512_setzero_si512();
+    std::size_t q = 0;
+    for (; q + kQueriesAtOnce <= num_queries; q += kQueriesAtOnce) {
+      best = larger_coarse_sums<kQueriesAtOnce>(queries + q * kCoarseCounts, counts, best);
+    }
+    for (; q < num_queries; ++q) {
+      best = larger_coarse_sums<1>(queries + q * kCoarseCounts, counts, best);
+    }
+    const __m256i packed = _mm512_cvtepi32_epi16(best);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + group * kInterleaved), packed);
+    largest[group] = largest_of_16(packed);
   }
 }
 
 }  // namespace
 
-const Kernels kAvx512Kernels{
-    "avx512",     max_overlaps<overlap>, max_min_sums, describe_constants, nearest_two,
-    integral_row, hessian_row,           maxima_row,   cell_means,         describe};
+const Kernels kAvx512Kernels{"avx512",
+                             max_overlaps<overlap>,
+                             reaching_queries<Pair>,
+                             largest_coarse_sums,
+                             select_sums,
+                             describe_constants,
+                             nearest_two,
+                             integral_row,
+                             hessian_row,
+                             maxima_row,
+                             cell_means,
+                             describe};
 
 }  // namespace loopbit

@@ -53,28 +53,82 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   }
 }
 
-unsigned min_sum(const std::uint8_t* a, const std::uint8_t* b) {
+/// The sum of the minima with one record of a pair.
+unsigned paired_sum(const std::uint8_t* query, const std::uint8_t* pair, std::size_t record) {
   unsigned sum = 0;
-  for (std::size_t k = 0; k < kBlockCounts; ++k) sum += a[k] < b[k] ? a[k] : b[k];
+  for (std::size_t first = 0; first < kBlockCounts; first += kPairedCounts) {
+    const std::uint8_t* counts = pair + 2 * first + record * kPairedCounts;
+    for (std::size_t k = 0; k < kPairedCounts; ++k) {
+      sum += query[first + k] < counts[k] ? query[first + k] : counts[k];
+    }
+  }
   return sum;
 }
 
-void max_min_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* records,
-                  std::size_t num_records, std::uint16_t* largest) {
-  for (std::size_t i = 0; i < num_records; ++i) {
+void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const std::uint8_t* pairs,
+                      std::size_t num_pairs, const std::uint16_t* least, std::uint16_t* largest,
+                      std::uint16_t* reaching) {
+  for (std::size_t i = 0; i < 2 * num_pairs; ++i) {
     unsigned best = 0;
-    for (std::size_t q = 0; q < num_queries; ++q) {
-      const unsigned sum = min_sum(queries + q * kBlockCounts, records + i * kBlockCounts);
+    unsigned reached = 0;
+    for (std::size_t q = 0; among >> q != 0; ++q) {
+      if ((among >> q & 1U) == 0) continue;
+      const unsigned sum =
+          paired_sum(queries + q * kBlockCounts, pairs + i / 2 * 2 * kBlockCounts, i % 2);
       best = sum > best ? sum : best;
+      if (sum >= least[i]) reached |= 1U << q;
     }
     largest[i] = static_cast<std::uint16_t>(best);
+    reaching[i] = static_cast<std::uint16_t>(reached);
   }
+}
+
+/// The sum of the minima with record i of an interleaved group.
+unsigned coarse_sum(const std::uint8_t* query, const std::uint8_t* group, std::size_t i) {
+  unsigned sum = 0;
+  for (std::size_t k = 0; k < kCoarseCounts; ++k) {
+    const std::size_t first = k / kCountsAtOnce * kCountsAtOnce;
+    const std::uint8_t count = group[first * kInterleaved + i * kCountsAtOnce + k - first];
+    sum += query[k] < count ? query[k] : count;
+  }
+  return sum;
+}
+
+void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
+                         const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
+                         std::uint16_t* largest) {
+  for (std::size_t group = 0; group < num_groups; ++group) {
+    unsigned best_of_all = 0;
+    for (std::size_t i = 0; i < kInterleaved; ++i) {
+      unsigned best = 0;
+      for (std::size_t q = 0; q < num_queries; ++q) {
+        const unsigned sum = coarse_sum(queries + q * kCoarseCounts,
+                                        groups + group * kInterleaved * kCoarseCounts, i);
+        best = sum > best ? sum : best;
+      }
+      sums[group * kInterleaved + i] = static_cast<std::uint16_t>(best);
+      best_of_all = best > best_of_all ? best : best_of_all;
+    }
+    largest[group] = static_cast<std::uint16_t>(best_of_all);
+  }
+}
+
+std::size_t select_sums(const std::uint16_t* sums, std::size_t num_sums, std::uint16_t lower,
+                        std::uint16_t upper, std::uint32_t* numbers) {
+  std::size_t selected = 0;
+  for (std::size_t i = 0; i < num_sums; ++i) {
+    if (sums[i] >= lower && sums[i] < upper) numbers[selected++] = static_cast<std::uint32_t>(i);
+  }
+  return selected;
 }
 
 }  // namespace
 
-const Kernels kScalarKernels{
-    "scalar",     max_overlaps<overlap>, max_min_sums, describe_constants, nearest_two,
-    integral_row, hessian_row,           maxima_row,   cell_means,         describe};
+const Kernels kScalarKernels{"scalar",         max_overlaps<overlap>,
+                             reaching_queries, largest_coarse_sums,
+                             select_sums,      describe_constants,
+                             nearest_two,      integral_row,
+                             hessian_row,      maxima_row,
+                             cell_means,       describe};
 
 }  // namespace loopbit

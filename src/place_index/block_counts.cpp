@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "block_counts.hpp"
 
-#include <algorithm>
-
 namespace loopbit {
 namespace {
 
@@ -31,9 +29,14 @@ BlockCounts block_counts(const BinaryContent& content) {
   return counts;
 }
 
-void raise(BlockCounts& maxima, const BlockCounts& counts) {
-  std::transform(maxima.of.begin(), maxima.of.end(), counts.of.begin(), maxima.of.begin(),
-                 [](std::uint8_t a, std::uint8_t b) { return std::max(a, b); });
+CoarseCounts coarse_counts(const BlockCounts& counts) {
+  constexpr std::size_t kColumns = BlockCounts::kColumns;
+  CoarseCounts coarse;
+  for (std::size_t i = 0; i < kCoarseCounts; ++i) {
+    const std::size_t upper = i / kColumns * 2 * kColumns + i % kColumns;
+    coarse.of[i] = static_cast<std::uint8_t>(counts.of[upper] + counts.of[upper + kColumns]);
+  }
+  return coarse;
 }
 
 }  // namespace loopbit

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
 #include "loopbit/binary_content.hpp"
+#include "loopbit/kernels.hpp"
 
 namespace loopbit {
 
@@ -15,12 +17,23 @@ struct BlockCounts {
   static constexpr std::size_t kRows = 16;
   static constexpr std::size_t kColumns = 8;
 
-  alignas(64) std::array<std::uint8_t, kRows * kColumns> of{};
+  alignas(64) std::array<std::uint8_t, kBlockCounts> of{};
+};
+static_assert(BlockCounts::kRows * BlockCounts::kColumns == kBlockCounts);
+
+/// The same in blocks of 8 x 8 pixels: 8 blocks a row, 8 rows, counts 0 to 64.
+struct CoarseCounts {
+  alignas(64) std::array<std::uint8_t, kCoarseCounts> of{};
 };
 
 [[nodiscard]] BlockCounts block_counts(const BinaryContent& content);
+[[nodiscard]] CoarseCounts coarse_counts(const BlockCounts& counts);
 
 /// Raises each of `maxima` to what `counts` has there.
-void raise(BlockCounts& maxima, const BlockCounts& counts);
+template <typename Counts>
+void raise(Counts& maxima, const Counts& counts) {
+  std::transform(maxima.of.begin(), maxima.of.end(), counts.of.begin(), maxima.of.begin(),
+                 [](std::uint8_t a, std::uint8_t b) { return std::max(a, b); });
+}
 
 }  // namespace loopbit

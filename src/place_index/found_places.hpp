@@ -30,10 +30,18 @@ class FoundPlaces {
            (similarity == floor_.similarity && place <= floor_.place);
   }
 
-  /// Whether overlap / larger_count is certainly below the floor; quicker than dividing.
-  [[nodiscard]] bool is_below_floor(int overlap, int larger_count) const {
-    constexpr double kRoundingMargin = 1.0 - 1e-12;
-    return overlap < floor_.similarity * kRoundingMargin * larger_count;
+  /// No smaller overlap can matter where max(|O1|, |O2|) is `larger_count`: their quotient is
+  /// below the floor. Quicker than dividing, and at most one less than the least that can.
+  [[nodiscard]] int least_overlap(int larger_count) const {
+    constexpr double kNearlyOne = 1.0 - 1e-6;  // rounding is far less than what is missing
+    return static_cast<int>(floor_.similarity * larger_count + kNearlyOne);
+  }
+
+  /// Whether a place with at most this overlap, numbered `place` or later, can matter.
+  [[nodiscard]] bool may_matter(int overlap, int larger_count, PlaceId place) const {
+    const int least = least_overlap(larger_count);
+    if (overlap != least) return overlap > least;
+    return may_matter(static_cast<double>(overlap) / larger_count, place);
   }
 
   /// Takes note of a candidate that may matter. Cost: linear in max_candidates.

@@ -33,7 +33,9 @@ PlaceId PlaceStore::add(const BinaryContent& content) {
   const auto set = static_cast<std::uint16_t>(loopbit::count(content));
   chunk.contents[place % kChunkPlaces] = content;
   chunk.bounds->counts[place % kChunkPlaces] = set;
-  extend_stretches(place, content, set);
+  const BlockCounts blocks = block_counts(content);
+  extend_stretches(place, {blocks, set});
+  extend_coarse_stretch(place, {coarse_counts(blocks), set});
   size_.store(id + 1, std::memory_order_release);
   return id;
 }
@@ -43,26 +45,46 @@ void PlaceStore::take_chunk(std::size_t number) {
   memory_.reserve(memory_.size() + 2);
   MappedMemory contents = file_ ? file_->extend(kContentsBytes) : MappedMemory(kContentsBytes);
   MappedMemory bounds(sizeof(Bounds));
-  if (number >= kFirstChunkOfLargePages) bounds.prefer_large_pages();
+  if (number >= kFirstChunkOfLargePages) {
+    bounds.prefer_large_pages();
+    if (!file_) contents.prefer_large_pages();
+  }
   chunks_[number] = {static_cast<BinaryContent*>(contents.data()),
                      static_cast<Bounds*>(bounds.data())};
   memory_.push_back(std::move(contents));
   memory_.push_back(std::move(bounds));
 }
 
-void PlaceStore::extend_stretches(std::size_t place, const BinaryContent& content,
-                                  std::uint16_t count) {
-  GrowingStretch finer{block_counts(content), count};
-  for (std::size_t level = kFinestLevel + 1; level-- > 0;) {
-    GrowingStretch& growing = growing_[level];
-    raise(growing.maxima, finer.maxima);
-    growing.smallest_count = std::min(growing.smallest_count, finer.smallest_count);
+void PlaceStore::extend_stretches(std::size_t place, const Growing<BlockCounts>& counts) {
+  Growing<BlockCounts> finer = counts;
+  for (std::size_t level = kFinestLevel; level > 0; --level) {
+    Growing<BlockCounts>& growing = growing_[level];
+    growing.include(finer);
     if ((place + 1) % kStretchPlaces[level] != 0) return;
     const Position at = position(level, place / kStretchPlaces[level]);
-    at.bounds->maxima[at.record] = growing.maxima;
+    BlockPair& pair = at.bounds->maxima[(at.record - kFirstRecord[1]) / 2];
+    for (std::size_t first = 0; first < kBlockCounts; first += kPairedCounts) {
+      std::copy_n(growing.maxima.of.begin() + first, kPairedCounts,
+                  pair.of.begin() + 2 * first + at.record % 2 * kPairedCounts);
+    }
     at.bounds->smallest_counts[at.record] = growing.smallest_count;
-    finer = std::exchange(growing, GrowingStretch{});
+    finer = std::exchange(growing, {});
   }
+}
+
+void PlaceStore::extend_coarse_stretch(std::size_t place, const Growing<CoarseCounts>& counts) {
+  growing_coarse_.include(counts);
+  if ((place + 1) % kStretchPlaces.front() != 0) return;
+  const std::size_t stretch = place / kStretchPlaces.front();
+  const Position at = position(0, stretch);
+  CoarseGroup& group = at.bounds->coarse[at.record / kInterleaved];
+  for (std::size_t k = 0; k < kCoarseCounts; ++k) {
+    const std::size_t first = k / kCountsAtOnce * kCountsAtOnce;
+    group.of[first * kInterleaved + stretch % kInterleaved * kCountsAtOnce + k - first] =
+        growing_coarse_.maxima.of[k];
+  }
+  at.bounds->smallest_counts[at.record] = growing_coarse_.smallest_count;
+  growing_coarse_ = {};
 }
 
 }  // namespace loopbit

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -20,13 +21,21 @@ namespace loopbit {
 
 /// Consecutive places bounded together, coarse to fine. Neighbours in time look alike, so that the
 /// maximum over a stretch is little more than any of its places.
-inline constexpr std::array<std::size_t, 4> kStretchBits{9, 5, 3, 1};
-inline constexpr std::array<std::size_t, 4> kStretchPlaces{512, 32, 8, 2};
+inline constexpr std::array<std::size_t, 4> kStretchBits{5, 4, 3, 1};
+inline constexpr std::array<std::size_t, 4> kStretchPlaces{32, 16, 8, 2};
 inline constexpr std::size_t kFinestLevel = kStretchPlaces.size() - 1;
 
-struct StretchBounds {
-  const BlockCounts* maxima;             ///< the largest block counts among its places
-  const std::uint16_t* smallest_counts;  ///< the smallest |O| among them
+/// The coarsest stretches are bounded side by side, 16 at once.
+inline constexpr std::size_t kGroupPlaces = kInterleaved * kStretchPlaces.front();
+
+/// The largest block counts in each of two consecutive stretches, paired as kernels want them.
+struct BlockPair {
+  alignas(64) std::array<std::uint8_t, 2 * kBlockCounts> of;
+};
+
+/// The largest coarse counts in each of 16 consecutive stretches, interleaved.
+struct CoarseGroup {
+  alignas(64) std::array<std::uint8_t, kInterleaved * kCoarseCounts> of;
 };
 
 /// The contents of all places, their counts, and bounds for stretches of them. Stretch i of a level
@@ -57,16 +66,26 @@ class PlaceStore {
   [[nodiscard]] int count(std::size_t place) const {
     return chunks_[place / kChunkPlaces].bounds->counts[place % kChunkPlaces];
   }
-  /// The bounds of a stretch, and, up to the end of the chunk, of those after it.
-  [[nodiscard]] StretchBounds bounds(std::size_t level, std::size_t stretch) const {
+  /// The smallest |O| in a stretch, and, up to the end of the chunk, in those after it.
+  [[nodiscard]] const std::uint16_t* smallest_counts(std::size_t level, std::size_t stretch) const {
     const Position at = position(level, stretch);
-    return {&at.bounds->maxima[at.record], &at.bounds->smallest_counts[at.record]};
+    return &at.bounds->smallest_counts[at.record];
+  }
+  /// Likewise the largest block counts, by pairs. `stretch` is even. Not for the coarsest level.
+  [[nodiscard]] const BlockPair* maxima(std::size_t level, std::size_t stretch) const {
+    const Position at = position(level, stretch);
+    return &at.bounds->maxima[(at.record - kFirstRecord[1]) / 2];
+  }
+  /// Likewise for the coarsest level, by groups of 16 stretches.
+  [[nodiscard]] const CoarseGroup* coarse_group(std::size_t group) const {
+    return &chunks_[group / kChunkGroups].bounds->coarse[group % kChunkGroups];
   }
 
  private:
   static constexpr std::size_t kChunkBits = 16;
   static constexpr std::size_t kChunkPlaces = std::size_t{1} << kChunkBits;
   static constexpr std::size_t kMaxChunks = (std::size_t{1} << 31U) / kChunkPlaces;
+  static constexpr std::size_t kChunkGroups = kChunkPlaces / kGroupPlaces;
 
   /// Where the records of each level begin in a chunk, and, last, how many there are.
   static constexpr auto kFirstRecord = [] {
@@ -78,7 +97,8 @@ class PlaceStore {
   }();
 
   struct Bounds {
-    std::array<BlockCounts, kFirstRecord.back()> maxima;
+    std::array<CoarseGroup, kChunkGroups> coarse;
+    std::array<BlockPair, (kFirstRecord.back() - kFirstRecord[1]) / 2> maxima;
     std::array<std::uint16_t, kFirstRecord.back()> smallest_counts;
     std::array<std::uint16_t, kChunkPlaces> counts;
   };
@@ -90,9 +110,15 @@ class PlaceStore {
     Bounds* bounds;
     std::size_t record;
   };
-  struct GrowingStretch {
-    BlockCounts maxima;
+  template <typename Counts>
+  struct Growing {
+    Counts maxima;
     std::uint16_t smallest_count = UINT16_MAX;
+
+    void include(const Growing& other) {
+      raise(maxima, other.maxima);
+      smallest_count = std::min(smallest_count, other.smallest_count);
+    }
   };
 
   [[nodiscard]] Position position(std::size_t level, std::size_t stretch) const {
@@ -101,10 +127,12 @@ class PlaceStore {
     return {chunks_[stretch >> bits].bounds, kFirstRecord[level] + in_chunk};
   }
   void take_chunk(std::size_t number);
-  void extend_stretches(std::size_t place, const BinaryContent& content, std::uint16_t count);
+  void extend_stretches(std::size_t place, const Growing<BlockCounts>& counts);
+  void extend_coarse_stretch(std::size_t place, const Growing<CoarseCounts>& counts);
 
-  std::array<GrowingStretch, kStretchPlaces.size()> growing_;  ///< for the writer only
-  std::unique_ptr<ScratchFile> file_;                          ///< of the contents, if any
+  std::array<Growing<BlockCounts>, kStretchPlaces.size()> growing_;  ///< by level; the writer's
+  Growing<CoarseCounts> growing_coarse_;                             ///< the writer's, too
+  std::unique_ptr<ScratchFile> file_;                                ///< of the contents, if any
   std::vector<MappedMemory> memory_;  ///< of all chunks; for the writer only
   std::unique_ptr<Chunk[]> chunks_;   ///< room for all there can be; size_ tells how many are there
   std::atomic<PlaceId> size_ = 0;

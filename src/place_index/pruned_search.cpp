@@ -3,6 +3,7 @@
 #include "pruned_search.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstdlib>
 #include <utility>
@@ -10,31 +11,25 @@
 namespace loopbit {
 namespace {
 
-/// Neighbouring shifts that are bounded together first.
-constexpr std::size_t kShiftsPerGroup = 3;
+/// Shifts are bounded one by one up to so many; beyond, neighbours together.
+constexpr std::size_t kMaxShiftGroups = 16;
 
-/// Stretches whose bounds are computed by one call of a kernel.
+/// Groups of coarsest stretches that one call of a kernel bounds; they lie in one chunk.
+constexpr std::size_t kGroupRun = 16;
+/// Finer stretches that one call bounds at most.
 constexpr std::size_t kRun = 16;
 
-/// The level whose stretches are searched best first.
-constexpr std::size_t kSortedLevel = 1;
-/// Of the coarsest stretches, one in so many is searched before the others are looked into.
-constexpr std::size_t kCoarseToFirst = 64;
-/// At kSortedLevel so many go first, then kBatchGrowth times as many, and so on.
+/// So many groups of the largest sums go first, then kBatchGrowth times as many, and so on.
 constexpr std::size_t kFirstBatch = 8;
 constexpr std::size_t kBatchGrowth = 8;
-/// So many are descended into together.
-constexpr std::size_t kSlice = 8;
+/// So many coarsest stretches are descended into together; where there are no more, fewer.
+constexpr std::size_t kSlice = 128;
+constexpr std::size_t kSliceOfFew = 4;
 
 /// Memory is asked for so many stretches ahead of its use.
-constexpr std::size_t kAhead = 6;
+constexpr std::size_t kAhead = 4;
 
 constexpr std::size_t kFinestPlaces = kStretchPlaces[kFinestLevel];
-
-template <typename Stretch>
-bool has_larger_bound(const Stretch& a, const Stretch& b) {
-  return a.bound > b.bound;
-}
 
 void prefetch(const void* begin, std::size_t size_bytes) {
   constexpr std::size_t kLine_bytes = 64;
@@ -50,87 +45,128 @@ PrunedSearch::PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryCon
       kernels_(kernels),
       options_(options),
       end_(static_cast<std::size_t>(end)),
-      query_count_(count(query)),
+      num_groups_(end_ / kGroupPlaces),
+      query_count_(static_cast<std::uint16_t>(count(query))),
       query_center_(center(query)),
       found_(options) {
   prepare_shifts(query, options.shift_tolerance_columns);
+  all_shifts_ = static_cast<std::uint16_t>((1U << group_counts_.size()) - 1);
+  coarse_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_ * kInterleaved);
+  selected_ = std::make_unique_for_overwrite<std::uint32_t[]>(num_groups_ * kInterleaved);
+  largest_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_);
 }
 
 void PrunedSearch::prepare_shifts(const BinaryContent& query, int tolerance_columns) {
+  const std::size_t shifts = 2 * static_cast<std::size_t>(tolerance_columns) + 1;
+  shifts_per_group_ = (shifts + kMaxShiftGroups - 1) / kMaxShiftGroups;
+  shifted_.reserve(shifts);
   for (int columns = -tolerance_columns; columns <= tolerance_columns; ++columns) {
-    if (shifted_.size() % kShiftsPerGroup == 0) group_counts_.emplace_back();
+    if (shifted_.size() % shifts_per_group_ == 0) {
+      group_counts_.emplace_back();
+      coarse_counts_.emplace_back();
+    }
     shifted_.push_back(shift_columns(query, columns));
-    shift_counts_.push_back(block_counts(shifted_.back()));
-    raise(group_counts_.back(), shift_counts_.back());
+    const BlockCounts counts = block_counts(shifted_.back());
+    raise(group_counts_.back(), counts);
+    raise(coarse_counts_.back(), coarse_counts(counts));
   }
 }
 
 std::vector<Candidate> PrunedSearch::run() {
-  std::vector<Stretch> coarse;
-  const std::size_t whole = end_ / kStretchPlaces.front();
-  for (std::size_t first = 0; first < whole; first += kRun) {
-    bound_run(0, first, std::min(first + kRun, whole), coarse);
-  }
-  // The most promising stretches give a first floor, below which most others need no look inside.
-  search_inside(take_best(coarse, 1 + coarse.size() / kCoarseToFirst));
-  search_rest();
-  search_inside(coarse);
+  bound_coarse_stretches();
+  search_coarse_stretches();
+  search_tail();
   return std::move(found_).answer();
 }
 
-/// Moves the `wanted` stretches of largest bound, or all, out of `stretches`; both keep their
-/// order.
-std::vector<PrunedSearch::Stretch> PrunedSearch::take_best(std::vector<Stretch>& stretches,
-                                                           std::size_t wanted) {
-  if (stretches.size() <= wanted) return std::exchange(stretches, {});
-  std::vector<Stretch> sorted = stretches;
-  const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(wanted) - 1;
-  std::nth_element(sorted.begin(), last, sorted.end(), has_larger_bound<Stretch>);
-  std::vector<Stretch> best;
-  std::vector<Stretch> others;
-  for (const Stretch& stretch : stretches) {
-    const bool is_best = stretch.bound >= last->bound && best.size() < wanted;
-    (is_best ? best : others).push_back(stretch);
+/// Searches the places behind the last whole group of coarsest stretches.
+void PrunedSearch::search_tail() {
+  std::size_t searched = num_groups_ * kGroupPlaces;
+  for (std::size_t level = 1; level <= kFinestLevel; ++level) {
+    const std::size_t last = end_ / kStretchPlaces[level] / 2 * 2;
+    std::vector<Stretch> stretches;
+    for (std::size_t first = searched / kStretchPlaces[level]; first < last; first += kRun) {
+      bound_run(level, first, std::min(first + kRun, last), all_shifts_, stretches);
+    }
+    descend(level, stretches);
+    searched = last * kStretchPlaces[level];
   }
-  stretches.swap(others);
-  return best;
+  for (; searched < end_; ++searched) compare_place(searched);
 }
 
-/// Searches coarsest stretches.
-void PrunedSearch::search_inside(const std::vector<Stretch>& coarse) {
-  std::vector<Stretch> finer;
-  bound_children(0, coarse, finer);
-  search_best_first(kSortedLevel, std::move(finer));
+void PrunedSearch::bound_coarse_stretches() {
+  const std::size_t shift_groups = coarse_counts_.size();
+  for (std::size_t first = 0; first < num_groups_; first += kGroupRun) {
+    const std::size_t groups = std::min(kGroupRun, num_groups_ - first);
+    kernels_.largest_coarse_sums(coarse_counts_.front().of.data(), shift_groups,
+                                 store_.coarse_group(first)->of.data(), groups,
+                                 &coarse_sums_[first * kInterleaved], &largest_sums_[first]);
+  }
+  work_.stretches[0] = static_cast<std::int64_t>(num_groups_ * kInterleaved);
 }
 
-/// Bounds the stretches first to last - 1, at most kRun, of one chunk, and appends to `kept` those
-/// that may matter: by groups of shifts, and those that are left by each shift.
-void PrunedSearch::bound_run(std::size_t level, std::size_t first, std::size_t last,
-                             std::vector<Stretch>& kept) {
-  if (first >= last) return;
-  const std::size_t run = last - first;
-  const StretchBounds bounds = store_.bounds(level, first);
-  std::array<std::uint16_t, kRun> overlaps;  // NOLINT: written to before it is read
-  kernels_.max_min_sums(group_counts_.front().of.data(), group_counts_.size(),
-                        bounds.maxima->of.data(), run, overlaps.data());
-  work_.stretches[level] += static_cast<std::int64_t>(run);
+/// Searches the coarsest stretches, those of large sums first, so that the floor soon rises above
+/// the bounds of the rest. Batches by sum, each in the order of places, take less time than sorting
+/// all.
+void PrunedSearch::search_coarse_stretches() {
+  constexpr std::size_t kMaxSum = std::size_t{kContentSide} * kContentSide;
+  constexpr std::size_t kSumsPerBucket = 4;
+  std::array<std::uint32_t, kMaxSum / kSumsPerBucket + 1> sizes{};
+  for (std::size_t i = 0; i < num_groups_; ++i) ++sizes[largest_sums_[i] / kSumsPerBucket];
 
-  for (std::size_t i = 0; i < run; ++i) {
-    const int larger = std::max<int>(query_count_, bounds.smallest_counts[i]);
-    if (found_.is_below_floor(overlaps[i], larger)) continue;
-    bound_single_shifts(level, static_cast<std::uint32_t>(first + i), bounds.maxima[i], larger,
-                        kept);
+  std::size_t wanted = kFirstBatch;
+  for (std::size_t end = sizes.size(); end > 0; wanted *= kBatchGrowth) {
+    const std::size_t upper_sum = end * kSumsPerBucket;
+    if (static_cast<int>(upper_sum) <= found_.least_overlap(query_count_)) return;
+    for (std::size_t got = 0; end > 0 && got < wanted;) got += sizes[--end];
+    search_sums_between(end * kSumsPerBucket, upper_sum);
   }
 }
 
-void PrunedSearch::bound_single_shifts(std::size_t level, std::uint32_t number,
-                                       const BlockCounts& maxima, int larger_count,
-                                       std::vector<Stretch>& kept) {
-  std::uint16_t overlap = 0;
-  kernels_.max_min_sums(shift_counts_.front().of.data(), shift_counts_.size(), maxima.of.data(), 1,
-                        &overlap);
-  const Stretch stretch{static_cast<double>(overlap) / larger_count, number};
-  if (overlap > 0 && may_matter(level, stretch)) kept.push_back(stretch);
+/// Searches the coarsest stretches whose sums are at least `lower` and below `upper`.
+void PrunedSearch::search_sums_between(std::size_t lower, std::size_t upper) {
+  const auto least = static_cast<std::size_t>(std::max(1, found_.least_overlap(query_count_)));
+  const std::size_t selected =
+      kernels_.select_sums(coarse_sums_.get(), num_groups_ * kInterleaved,
+                           static_cast<std::uint16_t>(std::max(lower, least)),
+                           static_cast<std::uint16_t>(upper), selected_.get());
+  std::vector<Stretch>& stretches = children_.front();
+  stretches.clear();
+  stretches.reserve(selected);
+  for (std::size_t i = 0; i < selected; ++i) {
+    const std::uint32_t number = selected_[i];
+    stretches.push_back({number, coarse_sums_[number],
+                         larger_count(*store_.smallest_counts(0, number)), all_shifts_});
+  }
+  // Few are worth sorting: the best of them raise the floor for the others.
+  const bool are_few = selected <= kSlice;
+  if (are_few) {
+    std::sort(stretches.begin(), stretches.end(),
+              [](const Stretch& a, const Stretch& b) { return a.sum > b.sum; });
+  }
+  const std::size_t slice = are_few ? kSliceOfFew : kSlice;
+  const std::span<const Stretch> all = stretches;
+  for (std::size_t first = 0; first < selected; first += slice) {
+    descend(0, all.subspan(first, std::min(slice, selected - first)));
+  }
+}
+
+/// Searches stretches down to their places.
+void PrunedSearch::descend(std::size_t level, std::span<const Stretch> stretches) {
+  if (level < kFinestLevel) {
+    std::vector<Stretch>& children = children_[level + 1];
+    children.clear();
+    bound_children(level, stretches, children);
+    descend(level + 1, children);
+    return;
+  }
+  for (std::size_t i = 0; i < stretches.size(); ++i) {
+    if (i + kAhead < stretches.size()) {
+      prefetch(&store_.content(stretches[i + kAhead].number * kFinestPlaces),
+               kFinestPlaces * sizeof(BinaryContent));
+    }
+    if (may_matter(level, stretches[i])) compare_stretch(stretches[i]);
+  }
 }
 
 /// Appends to `kept` the stretches of the next level within `parents` that may matter.
@@ -139,91 +175,51 @@ void PrunedSearch::bound_children(std::size_t level, std::span<const Stretch> pa
   const std::size_t children = kStretchPlaces[level] / kStretchPlaces[level + 1];
   for (std::size_t i = 0; i < parents.size(); ++i) {
     if (i + kAhead < parents.size()) {
-      prefetch(store_.bounds(level + 1, parents[i + kAhead].number * children).maxima,
-               children * sizeof(BlockCounts));
+      const std::size_t first = parents[i + kAhead].number * children;
+      prefetch(store_.maxima(level + 1, first), children / 2 * sizeof(BlockPair));
+      prefetch(store_.smallest_counts(level + 1, first), 1);
     }
     if (!may_matter(level, parents[i])) continue;
     const std::size_t first = parents[i].number * children;
-    bound_run(level + 1, first, first + children, kept);
+    bound_run(level + 1, first, first + children, parents[i].shifts, kept);
   }
 }
 
-/// Searches stretches down to their places.
-void PrunedSearch::descend(std::size_t level, std::span<Stretch> stretches) {
-  if (level < kFinestLevel) {
-    std::vector<Stretch>& children = children_[level + 1];
-    children.clear();
-    bound_children(level, stretches, children);
-    descend(level + 1, children);
-    return;
+/// Bounds the stretches first to last - 1, at most kRun, of one chunk, at some of the shifts, and
+/// appends to `kept` those that may matter.
+void PrunedSearch::bound_run(std::size_t level, std::size_t first, std::size_t last,
+                             std::uint16_t shifts, std::vector<Stretch>& kept) {
+  const std::size_t run = last - first;
+  const std::uint16_t* smallest = store_.smallest_counts(level, first);
+  std::array<std::uint16_t, kRun> least{};
+  std::array<std::uint16_t, kRun> sums;      // NOLINT: written to before it is read
+  std::array<std::uint16_t, kRun> reaching;  // NOLINT: likewise
+  for (std::size_t i = 0; i < run; ++i) {
+    const int needed = found_.least_overlap(larger_count(smallest[i]));
+    least[i] = static_cast<std::uint16_t>(std::max(1, needed));
   }
-  std::sort(stretches.begin(), stretches.end(), has_larger_bound<Stretch>);
-  for (std::size_t i = 0; i < stretches.size(); ++i) {
-    if (i + kAhead < stretches.size()) {
-      prefetch(&store_.content(stretches[i + kAhead].number * kFinestPlaces),
-               kFinestPlaces * sizeof(BinaryContent));
-    }
-    if (may_matter(level, stretches[i])) compare_stretch(stretches[i].number);
+  kernels_.reaching_queries(group_counts_.front().of.data(), shifts,
+                            store_.maxima(level, first)->of.data(), run / 2, least.data(),
+                            sums.data(), reaching.data());
+  work_.stretches[level] += static_cast<std::int64_t>(run);
+  for (std::size_t i = 0; i < run; ++i) {
+    if (reaching[i] == 0) continue;
+    const Stretch stretch{static_cast<std::uint32_t>(first + i), sums[i], larger_count(smallest[i]),
+                          reaching[i]};
+    if (sums[i] > least[i] || may_matter(level, stretch)) kept.push_back(stretch);
   }
-}
-
-/// Searches stretches, those of large bounds first, so that the floor soon rises above the bounds
-/// of the rest. Batches by bound, each in the order of places, take less time than sorting.
-void PrunedSearch::search_best_first(std::size_t level, std::vector<Stretch> stretches) {
-  constexpr std::size_t kBuckets = 1024;
-  const auto bucket_of = [](const Stretch& stretch) {
-    return std::min(static_cast<std::size_t>(stretch.bound * kBuckets), kBuckets - 1);
-  };
-  std::array<std::size_t, kBuckets> sizes{};
-  for (const Stretch& stretch : stretches) ++sizes[bucket_of(stretch)];
-
-  std::vector<Stretch> batch;
-  std::vector<Stretch> rest;
-  std::size_t wanted = kFirstBatch;
-  for (std::size_t end = kBuckets; !stretches.empty(); wanted *= kBatchGrowth) {
-    for (std::size_t got = 0; end > 0 && got < wanted;) got += sizes[--end];
-    batch.clear();
-    rest.clear();
-    for (const Stretch& stretch : stretches) {
-      if (may_matter(level, stretch)) (bucket_of(stretch) < end ? rest : batch).push_back(stretch);
-    }
-    stretches.swap(rest);
-    const std::span<Stretch> all = batch;
-    for (std::size_t first = 0; first < all.size(); first += kSlice) {
-      descend(level, all.subspan(first, std::min(kSlice, all.size() - first)));
-    }
-  }
-}
-
-/// Searches the places behind the last whole stretch of the coarsest level.
-void PrunedSearch::search_rest() {
-  std::size_t searched = end_ - end_ % kStretchPlaces.front();
-  for (std::size_t level = 1; level <= kFinestLevel; ++level) {
-    const std::size_t first = searched / kStretchPlaces[level];
-    const std::size_t last = end_ / kStretchPlaces[level];
-    std::vector<Stretch> stretches;
-    bound_run(level, first, last, stretches);
-    descend(level, stretches);
-    searched = last * kStretchPlaces[level];
-  }
-  if (searched < end_) compare_place(searched);
 }
 
 /// Compares the contents of a finest stretch with the query at the shifts that may matter.
-void PrunedSearch::compare_stretch(std::size_t number) {
-  const StretchBounds bounds = store_.bounds(kFinestLevel, number);
-  const int larger = std::max<int>(query_count_, *bounds.smallest_counts);
-  // The kernel takes the stretch for the query, which makes a sum of each shift.
-  shift_sums_.resize(shift_counts_.size());
-  kernels_.max_min_sums(bounds.maxima->of.data(), 1, shift_counts_.front().of.data(),
-                        shift_counts_.size(), shift_sums_.data());
-  const std::size_t first = number * kFinestPlaces;
+void PrunedSearch::compare_stretch(const Stretch& stretch) {
+  const std::size_t first = stretch.number * kFinestPlaces;
   std::array<std::uint16_t, kFinestPlaces> best{};
-  for (std::size_t shift = 0; shift < shifted_.size(); ++shift) {
-    if (found_.is_below_floor(shift_sums_[shift], larger)) continue;
+  for (unsigned left = stretch.shifts; left != 0; left &= left - 1) {
+    const std::size_t shift = static_cast<std::size_t>(std::countr_zero(left)) * shifts_per_group_;
     std::array<std::uint16_t, kFinestPlaces> overlaps{};
-    kernels_.max_overlaps(shifted_[shift].rows.data(), 1, store_.content(first).rows.data(),
-                          kFinestPlaces, overlaps.data());
+    kernels_.max_overlaps(shifted_[shift].rows.data(),
+                          std::min(shifts_per_group_, shifted_.size() - shift),
+                          store_.content(first).rows.data(), kFinestPlaces, overlaps.data());
     for (std::size_t i = 0; i < kFinestPlaces; ++i) best[i] = std::max(best[i], overlaps[i]);
   }
   work_.contents += std::int64_t{kFinestPlaces};
@@ -240,7 +236,7 @@ void PrunedSearch::compare_place(std::size_t place) {
 
 void PrunedSearch::consider(std::size_t place, int overlap) {
   if (overlap == 0) return;
-  const double xi = static_cast<double>(overlap) / std::max(query_count_, store_.count(place));
+  const double xi = static_cast<double>(overlap) / std::max<int>(query_count_, store_.count(place));
   const Candidate candidate{static_cast<PlaceId>(place), xi};
   if (found_.may_matter(xi, candidate.place) && is_within_limits(place)) found_.add(candidate);
 }

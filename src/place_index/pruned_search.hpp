@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -36,28 +38,33 @@ class PrunedSearch {
   [[nodiscard]] const RetrievalWork& work() const { return work_; }
 
  private:
+  /// A stretch whose places overlap the query by at most `sum`, at a max(|query|, |O|) of at least
+  /// `larger_count`.
   struct Stretch {
-    double bound;  ///< of xi
     std::uint32_t number;
+    std::uint16_t sum;
+    std::uint16_t larger_count;
+    std::uint16_t shifts;  ///< a bit for each group of shifts that may matter
   };
 
-  void prepare_shifts(const BinaryContent& query, int tolerance_columns);
   [[nodiscard]] bool may_matter(std::size_t level, const Stretch& stretch) const {
     const std::size_t first = std::size_t{stretch.number} << kStretchBits[level];
-    return found_.may_matter(stretch.bound, static_cast<PlaceId>(first));
+    return found_.may_matter(stretch.sum, stretch.larger_count, static_cast<PlaceId>(first));
   }
-  void bound_run(std::size_t level, std::size_t first, std::size_t last,
-                 std::vector<Stretch>& kept);
-  void bound_single_shifts(std::size_t level, std::uint32_t number, const BlockCounts& maxima,
-                           int larger_count, std::vector<Stretch>& kept);
+  [[nodiscard]] std::uint16_t larger_count(std::uint16_t count) const {
+    return std::max(query_count_, count);
+  }
+  void prepare_shifts(const BinaryContent& query, int tolerance_columns);
+  void search_tail();
+  void bound_coarse_stretches();
+  void search_coarse_stretches();
+  void search_sums_between(std::size_t lower, std::size_t upper);
+  void descend(std::size_t level, std::span<const Stretch> stretches);
   void bound_children(std::size_t level, std::span<const Stretch> parents,
                       std::vector<Stretch>& kept);
-  void descend(std::size_t level, std::span<Stretch> stretches);
-  static std::vector<Stretch> take_best(std::vector<Stretch>& stretches, std::size_t wanted);
-  void search_inside(const std::vector<Stretch>& coarse);
-  void search_best_first(std::size_t level, std::vector<Stretch> stretches);
-  void search_rest();
-  void compare_stretch(std::size_t number);
+  void bound_run(std::size_t level, std::size_t first, std::size_t last, std::uint16_t shifts,
+                 std::vector<Stretch>& kept);
+  void compare_stretch(const Stretch& stretch);
   void compare_place(std::size_t place);
   void consider(std::size_t place, int overlap);
   [[nodiscard]] bool is_within_limits(std::size_t place) const;
@@ -66,12 +73,17 @@ class PrunedSearch {
   const Kernels& kernels_;
   RetrievalOptions options_;
   std::size_t end_;
-  int query_count_;
+  std::size_t num_groups_;  ///< of coarsest stretches, all of them whole
+  std::uint16_t query_count_;
   cv::Point2d query_center_;
-  std::vector<BinaryContent> shifted_;     ///< the query at each shift
-  std::vector<BlockCounts> shift_counts_;  ///< of shifted_
-  std::vector<std::uint16_t> shift_sums_;  ///< scratch, by shift
-  std::vector<BlockCounts> group_counts_;  ///< for each group of neighbouring shifts, the maxima
+  std::vector<BinaryContent> shifted_;  ///< the query at each shift
+  std::size_t shifts_per_group_ = 1;
+  std::uint16_t all_shifts_ = 0;                   ///< a bit for each group of shifts
+  std::vector<BlockCounts> group_counts_;          ///< for each group of shifts, the maxima
+  std::vector<CoarseCounts> coarse_counts_;        ///< likewise
+  std::unique_ptr<std::uint16_t[]> coarse_sums_;   ///< for each coarsest stretch, the largest sum
+  std::unique_ptr<std::uint32_t[]> selected_;      ///< scratch, for coarsest stretches
+  std::unique_ptr<std::uint16_t[]> largest_sums_;  ///< for each group of stretches
   FoundPlaces found_;
   std::array<std::vector<Stretch>, kStretchPlaces.size()> children_;  ///< scratch, by level
   RetrievalWork work_;

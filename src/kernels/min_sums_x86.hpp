@@ -1,0 +1,81 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <immintrin.h>
+
+#include "kernel_variants.hpp"
+
+namespace loopbit {
+
+/// The largest of 16 unsigned 16-bit values. Static, as each instruction set needs its own.
+static std::uint16_t largest_of_16(__m256i values) {
+  const __m128i best =
+      _mm_max_epu16(_mm256_castsi256_si128(values), _mm256_extracti128_si256(values, 1));
+  // VPHMINPOSUW finds the smallest of eight.
+  const __m128i smallest = _mm_minpos_epu16(_mm_xor_si128(best, _mm_set1_epi16(-1)));
+  return static_cast<std::uint16_t>(~static_cast<unsigned>(_mm_cvtsi128_si32(smallest)));
+}
+
+static std::size_t select_sums(const std::uint16_t* sums, std::size_t num_sums, std::uint16_t lower,
+                               std::uint16_t upper, std::uint32_t* numbers) {
+  const __m256i first = _mm256_set1_epi16(static_cast<std::int16_t>(lower - 1));
+  const __m256i last = _mm256_set1_epi16(static_cast<std::int16_t>(upper));
+  std::size_t selected = 0;
+  for (std::size_t i = 0; i < num_sums; i += 16) {
+    const __m256i here = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(sums + i));
+    const __m256i between =
+        _mm256_and_si256(_mm256_cmpgt_epi16(here, first), _mm256_cmpgt_epi16(last, here));
+    const __m128i bytes =
+        _mm_packs_epi16(_mm256_castsi256_si128(between), _mm256_extracti128_si256(between, 1));
+    for (auto left = static_cast<std::uint32_t>(_mm_movemask_epi8(bytes)); left != 0;
+         left &= left - 1) {
+      numbers[selected++] =
+          static_cast<std::uint32_t>(i) + static_cast<std::uint32_t>(__builtin_ctz(left));
+    }
+  }
+  return selected;
+}
+
+/// Kernels::reaching_queries on top of one variant's Pair, a type of internal linkage for the
+/// reason that kernel_variants.hpp gives: it sums the minima in 64-bit lanes, of which four queries
+/// share the 16-bit quarters, and reduces them to the four sums with the first record and the four
+/// with the second.
+template <typename Pair>
+void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const std::uint8_t* pairs,
+                      std::size_t num_pairs, const std::uint16_t* least, std::uint16_t* largest,
+                      std::uint16_t* reaching) {
+  constexpr int kQueriesAtOnce = 4;
+  for (std::size_t i = 0; i < num_pairs; ++i) {
+    const Pair pair = Pair::load(pairs + i * 2 * kBlockCounts);
+    const __m128i need =
+        _mm_unpacklo_epi64(_mm_set1_epi16(static_cast<std::int16_t>(least[2 * i])),
+                           _mm_set1_epi16(static_cast<std::int16_t>(least[2 * i + 1])));
+    __m128i best = _mm_setzero_si128();
+    __m128i reached = _mm_setzero_si128();
+    for (std::uint32_t left = among; left != 0;) {
+      typename Pair::Lanes lanes{};
+      std::uint64_t bits = 0;
+      for (int n = 0; n < kQueriesAtOnce && left != 0; ++n, left &= left - 1) {
+        const auto q = static_cast<std::size_t>(__builtin_ctz(left));
+        pair.add_min_sums(queries + q * kBlockCounts, lanes);
+        bits = bits << 16U | std::uint64_t{1} << q;
+      }
+      const __m128i sums = Pair::reduce(lanes);
+      const __m128i reaches = _mm_cmpeq_epi16(_mm_max_epu16(sums, need), sums);
+      const __m128i queries_here = _mm_set1_epi64x(static_cast<std::int64_t>(bits));
+      reached = _mm_or_si128(reached, _mm_and_si128(reaches, queries_here));
+      best = _mm_max_epu16(best, sums);
+    }
+    best = _mm_max_epu16(best, _mm_srli_epi64(best, 32));
+    best = _mm_max_epu16(best, _mm_srli_epi64(best, 16));
+    reached = _mm_or_si128(reached, _mm_srli_epi64(reached, 32));
+    reached = _mm_or_si128(reached, _mm_srli_epi64(reached, 16));
+    largest[2 * i] = static_cast<std::uint16_t>(_mm_extract_epi16(best, 0));
+    largest[2 * i + 1] = static_cast<std::uint16_t>(_mm_extract_epi16(best, 4));
+    reaching[2 * i] = static_cast<std::uint16_t>(_mm_extract_epi16(reached, 0));
+    reaching[2 * i + 1] = static_cast<std::uint16_t>(_mm_extract_epi16(reached, 4));
+  }
+}
+
+}  // namespace loopbit
