@@ -132,11 +132,10 @@ int sum_of_minima(const Counts& queries, std::size_t q, const Counts& records, s
 void expect_reaching_queries(const Kernels& kernels, const Counts& queries, std::uint32_t among,
                              const Counts& records, const std::vector<std::uint16_t>& least) {
   const std::size_t num_records = records.size() / kBlockCounts;
-  std::vector<std::uint16_t> largest(num_records, 9999);
-  std::vector<std::uint16_t> reaching(num_records, 9999);
+  std::vector<Reached> reached(num_records, {9999, 9999});
   const Counts pairs = interleaved(records, kBlockCounts, 2, kPairedCounts);
   kernels.reaching_queries(queries.data(), among, pairs.data(), num_records / 2, least.data(),
-                           largest.data(), reaching.data());
+                           reached.data());
   for (std::size_t i = 0; i < num_records; ++i) {
     int expected_largest = 0;
     unsigned expected = 0;
@@ -146,8 +145,8 @@ void expect_reaching_queries(const Kernels& kernels, const Counts& queries, std:
       expected_largest = std::max(expected_largest, sum);
       if (sum >= least[i]) expected |= 1U << q;
     }
-    ASSERT_EQ(largest[i], expected_largest) << "record " << i << " among " << among;
-    ASSERT_EQ(reaching[i], expected) << "record " << i << " among " << among;
+    ASSERT_EQ(reached[i].largest_sum, expected_largest) << "record " << i << " among " << among;
+    ASSERT_EQ(reached[i].queries, expected) << "record " << i << " among " << among;
   }
 }
 

@@ -66,20 +66,18 @@ unsigned paired_sum(const std::uint8_t* query, const std::uint8_t* pair, std::si
 }
 
 void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const std::uint8_t* pairs,
-                      std::size_t num_pairs, const std::uint16_t* least, std::uint16_t* largest,
-                      std::uint16_t* reaching) {
+                      std::size_t num_pairs, const std::uint16_t* least, Reached* reached) {
   for (std::size_t i = 0; i < 2 * num_pairs; ++i) {
     unsigned best = 0;
-    unsigned reached = 0;
+    unsigned bits = 0;
     for (std::size_t q = 0; among >> q != 0; ++q) {
       if ((among >> q & 1U) == 0) continue;
       const unsigned sum =
           paired_sum(queries + q * kBlockCounts, pairs + i / 2 * 2 * kBlockCounts, i % 2);
       best = sum > best ? sum : best;
-      if (sum >= least[i]) reached |= 1U << q;
+      if (sum >= least[i]) bits |= 1U << q;
     }
-    largest[i] = static_cast<std::uint16_t>(best);
-    reaching[i] = static_cast<std::uint16_t>(reached);
+    reached[i] = {static_cast<std::uint16_t>(best), static_cast<std::uint16_t>(bits)};
   }
 }
 

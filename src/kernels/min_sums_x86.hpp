@@ -43,8 +43,7 @@ static std::size_t select_sums(const std::uint16_t* sums, std::size_t num_sums, 
 /// with the second.
 template <typename Pair>
 void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const std::uint8_t* pairs,
-                      std::size_t num_pairs, const std::uint16_t* least, std::uint16_t* largest,
-                      std::uint16_t* reaching) {
+                      std::size_t num_pairs, const std::uint16_t* least, Reached* reached) {
   constexpr int kQueriesAtOnce = 4;
   for (std::size_t i = 0; i < num_pairs; ++i) {
     const Pair pair = Pair::load(pairs + i * 2 * kBlockCounts);
@@ -52,7 +51,7 @@ void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const st
         _mm_unpacklo_epi64(_mm_set1_epi16(static_cast<std::int16_t>(least[2 * i])),
                            _mm_set1_epi16(static_cast<std::int16_t>(least[2 * i + 1])));
     __m128i best = _mm_setzero_si128();
-    __m128i reached = _mm_setzero_si128();
+    __m128i found = _mm_setzero_si128();
     for (std::uint32_t left = among; left != 0;) {
       typename Pair::Lanes lanes{};
       std::uint64_t bits = 0;
@@ -64,17 +63,17 @@ void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const st
       const __m128i sums = Pair::reduce(lanes);
       const __m128i reaches = _mm_cmpeq_epi16(_mm_max_epu16(sums, need), sums);
       const __m128i queries_here = _mm_set1_epi64x(static_cast<std::int64_t>(bits));
-      reached = _mm_or_si128(reached, _mm_and_si128(reaches, queries_here));
+      found = _mm_or_si128(found, _mm_and_si128(reaches, queries_here));
       best = _mm_max_epu16(best, sums);
     }
     best = _mm_max_epu16(best, _mm_srli_epi64(best, 32));
     best = _mm_max_epu16(best, _mm_srli_epi64(best, 16));
-    reached = _mm_or_si128(reached, _mm_srli_epi64(reached, 32));
-    reached = _mm_or_si128(reached, _mm_srli_epi64(reached, 16));
-    largest[2 * i] = static_cast<std::uint16_t>(_mm_extract_epi16(best, 0));
-    largest[2 * i + 1] = static_cast<std::uint16_t>(_mm_extract_epi16(best, 4));
-    reaching[2 * i] = static_cast<std::uint16_t>(_mm_extract_epi16(reached, 0));
-    reaching[2 * i + 1] = static_cast<std::uint16_t>(_mm_extract_epi16(reached, 4));
+    found = _mm_or_si128(found, _mm_srli_epi64(found, 32));
+    found = _mm_or_si128(found, _mm_srli_epi64(found, 16));
+    reached[2 * i] = {static_cast<std::uint16_t>(_mm_extract_epi16(best, 0)),
+                      static_cast<std::uint16_t>(_mm_extract_epi16(found, 0))};
+    reached[2 * i + 1] = {static_cast<std::uint16_t>(_mm_extract_epi16(best, 4)),
+                          static_cast<std::uint16_t>(_mm_extract_epi16(found, 4))};
   }
 }
 

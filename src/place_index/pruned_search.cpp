@@ -192,21 +192,21 @@ void PrunedSearch::bound_run(std::size_t level, std::size_t first, std::size_t l
   const std::size_t run = last - first;
   const std::uint16_t* smallest = store_.smallest_counts(level, first);
   std::array<std::uint16_t, kRun> least{};
-  std::array<std::uint16_t, kRun> sums;      // NOLINT: written to before it is read
-  std::array<std::uint16_t, kRun> reaching;  // NOLINT: likewise
+  std::array<Reached, kRun> reached;  // NOLINT: written to before it is read
   for (std::size_t i = 0; i < run; ++i) {
     const int needed = found_.least_overlap(larger_count(smallest[i]));
     least[i] = static_cast<std::uint16_t>(std::max(1, needed));
   }
   kernels_.reaching_queries(group_counts_.front().of.data(), shifts,
                             store_.maxima(level, first)->of.data(), run / 2, least.data(),
-                            sums.data(), reaching.data());
+                            reached.data());
   work_.stretches[level] += static_cast<std::int64_t>(run);
   for (std::size_t i = 0; i < run; ++i) {
-    if (reaching[i] == 0) continue;
-    const Stretch stretch{static_cast<std::uint32_t>(first + i), sums[i], larger_count(smallest[i]),
-                          reaching[i]};
-    if (sums[i] > least[i] || may_matter(level, stretch)) kept.push_back(stretch);
+    const auto [sum, reaching] = reached[i];
+    if (reaching == 0) continue;
+    const Stretch stretch{static_cast<std::uint32_t>(first + i), sum, larger_count(smallest[i]),
+                          reaching};
+    if (sum > least[i] || may_matter(level, stretch)) kept.push_back(stretch);
   }
 }
 

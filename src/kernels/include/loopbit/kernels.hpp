@@ -20,6 +20,12 @@ inline constexpr std::size_t kPairedCounts = 32;
 inline constexpr std::size_t kCoarseCounts = 64;
 inline constexpr std::size_t kInterleaved = 16;
 inline constexpr std::size_t kCountsAtOnce = 4;
+/// What several queries reach with one record.
+struct Reached {
+  std::uint16_t largest_sum;
+  std::uint16_t queries;  ///< a bit for each that has the least sum that is needed
+};
+
 /// 8-bit values in one descriptor.
 inline constexpr std::size_t kDescriptorSize = 64;
 
@@ -76,13 +82,12 @@ struct Kernels {
 
   /// Which queries reach what a record needs; each query has its 128 counts in [0, 32] in order,
   /// the records come in pairs. Of the queries q < 16 whose bit is set in `among`, bit q of
-  /// reaching[i] is set where the sum over k of min(queries[q][k], records[i][k]) is at least
-  /// least[i]; largest[i] is the largest of these sums.
+  /// reached[i].queries is set where the sum over k of min(queries[q][k], records[i][k]) is at
+  /// least least[i]; reached[i].largest_sum is the largest of these sums.
   /// Cost: for each of these queries and each pair, 256 bytes of minimum and sum.
   void (*reaching_queries)(const std::uint8_t* queries, std::uint32_t among,
                            const std::uint8_t* pairs, std::size_t num_pairs,
-                           const std::uint16_t* least, std::uint16_t* largest,
-                           std::uint16_t* reaching);
+                           const std::uint16_t* least, Reached* reached);
 
   /// The largest of such sums over all queries, of coarse counts in [0, 64]: each query has its 64
   /// in order, the records come in groups of 16 interleaved ones. sums[16 * g + i] belongs to
