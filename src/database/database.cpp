@@ -33,7 +33,11 @@ Database::Database(std::string path, Access access, Remedies remedies)
   if (result != SQLITE_OK) fail();
   sqlite3_busy_timeout(handle, kBusyTimeout_ms);
   sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kMaxRowBytes);
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  // A reader may read a file that was cut, as far as it goes, which SQLite allows only where the
+  // list of tables may be changed, too; nothing of ours changes it.
+  const bool reads = access == Access::read;
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, reads ? 0 : 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_WRITABLE_SCHEMA, reads ? 1 : 0, nullptr);
   sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   execute("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0");
 }

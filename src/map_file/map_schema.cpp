@@ -13,9 +13,6 @@
 namespace loopbit {
 namespace {
 
-/// Large pages: features take 48 KB a place, contents are read one after the other.
-constexpr int kPageBytes = 16384;
-
 struct Table {
   const char* name;
   const char* definition;  ///< as SQLite keeps it
@@ -47,13 +44,13 @@ void create_tables(const Database& database) {
 using Migration = void (*)(const Database&);
 constexpr std::array<Migration, kMapVersion> kMigrations{create_tables};
 
-Database::Remedies remedies() {
+Database::Remedies remedies(const std::string& path) {
   return {.write =
               "check the free space and the permissions of its folder, then run again with the "
               "same map: what was saved before is kept",
-          .read =
-              "it is missing, damaged or no map of loopbit's; 'loopbit map check' says what is "
-              "left of a damaged one"};
+          .read = fmt::format("it is no map of loopbit's, or damaged; 'loopbit map check {} "
+                              "--recover NEW.db' saves what is left of a damaged one",
+                              path)};
 }
 
 [[noreturn]] void refuse(const Database& database, const std::string& why) {
@@ -111,8 +108,8 @@ void migrate(const Database& database, int version) {
 }  // namespace
 
 Database open_map_for_writing(const std::string& path) {
-  Database database(path, Database::Access::create, remedies());
-  database.execute(fmt::format("PRAGMA page_size = {}", kPageBytes));
+  Database database(path, Database::Access::create, remedies(path));
+  database.execute(fmt::format("PRAGMA page_size = {}", kMapPageBytes));
   migrate(database, checked_version(database));
   check_tables(database);
   // Each commit is on disk when it returns (sqlite.org/wal.html, "Performance Considerations").
@@ -126,7 +123,7 @@ Database open_map_for_reading(const std::string& path) {
         ErrorKind::input,
         fmt::format("There is no map '{}'; 'loopbit run INPUT --map {}' makes one.", path, path));
   }
-  Database database(path, Database::Access::read, remedies());
+  Database database(path, Database::Access::read, remedies(path));
   if (checked_version(database) == 0) {
     refuse(database, "is empty; 'loopbit run INPUT --map' fills it");
   }
