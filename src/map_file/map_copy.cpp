@@ -23,9 +23,10 @@ void MapCopy::copy_session(MapSession session) {
   rows_.write(session);
 }
 
-bool MapCopy::copy_place(MapPlace place, const Features& features) {
-  if (!renumber(place.at)) return false;
-  rows_.write(place, features);
+bool MapCopy::copy_place(const MapPlace& place, const Features& features) {
+  MapPlace copy = place;
+  if (!renumber(copy.at)) return false;
+  rows_.write(copy, features);
   return true;
 }
 

@@ -24,7 +24,7 @@ class MapCopy {
   void copy_session(MapSession session);
 
   /// The two below: false if a session of theirs is left out.
-  bool copy_place(MapPlace place, const Features& features);
+  bool copy_place(const MapPlace& place, const Features& features);
   bool copy_loop(MapLoop loop);
 
  private:

@@ -63,12 +63,13 @@ MergeCounts merge_map(const std::string& into, const std::string& from) {
   std::int64_t id = next_place(to);
   to.execute("BEGIN IMMEDIATE");
   for (const MapSession& session : plan.added) copy.copy_session(session);
-  source.for_each_place([&](MapPlace place) {
+  source.for_each_place([&](const MapPlace& place) {
     if (!added.contains(place.at.session)) return;
     const auto features = source.features_of(place);
     if (!features) return;
-    place.id = id++;
-    counts.places += copy.copy_place(place, *features);
+    MapPlace copied = place;
+    copied.id = id++;
+    counts.places += copy.copy_place(copied, *features);
   });
   for (const MapLoop& loop : source.loops()) {
     if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
