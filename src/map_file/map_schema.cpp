@@ -36,6 +36,9 @@ constexpr std::array kTables{
           "NULL, similarity REAL NOT NULL, matches INTEGER NOT NULL, inliers INTEGER NOT NULL, "
           "checksum INTEGER NOT NULL)"}};
 
+/// SQLite makes it for AUTOINCREMENT.
+constexpr Table kSequences{"sqlite_sequence", "CREATE TABLE sqlite_sequence(name,seq)"};
+
 void create_tables(const Database& database) {
   for (const Table& table : kTables) database.execute(table.definition);
 }
@@ -59,7 +62,7 @@ Database::Remedies remedies(const std::string& path) {
 
 /// A map has the tables of its version and no others: no view or trigger of a stranger is run.
 void check_tables(const Database& database) {
-  Statement rows(database, "SELECT name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite_%'");
+  Statement rows(database, "SELECT name, sql FROM sqlite_schema");
   std::size_t known = 0;
   while (rows.step()) {
     const std::string name = rows.text(0);
@@ -67,14 +70,15 @@ void check_tables(const Database& database) {
     const auto is_this = [&](const Table& table) {
       return name == table.name && sql == table.definition;
     };
-    if (std::none_of(kTables.begin(), kTables.end(), is_this)) {
+    if (!is_this(kSequences) && std::none_of(kTables.begin(), kTables.end(), is_this)) {
       refuse(database, fmt::format("has a table '{}' that no map of version {} has: it was changed "
                                    "by something else; use a copy from before",
                                    name, kMapVersion));
     }
     ++known;
   }
-  if (known != kTables.size()) refuse(database, "lacks tables of a map: use a copy from before");
+  if (known != kTables.size() + 1)
+    refuse(database, "lacks tables of a map: use a copy from before");
 }
 
 /// The version of the map; 0 for an empty file.

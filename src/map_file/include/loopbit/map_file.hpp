@@ -126,7 +126,8 @@ class MapWriter : public MapStorage {
   void flush();
 
   /// Commits the rest and closes the file, which then is one file without a log beside it. Throws
-  /// Error (kind output). Nothing may be added afterwards.
+  /// Error (kind output). A detector of this map is of no use afterwards: what it asks for throws
+  /// Error (kind option).
   void finish();
 
   /// Throws Error (kind input) where a place is damaged: a damaged map is not written to.
