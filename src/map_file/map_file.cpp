@@ -151,7 +151,7 @@ class MapWriter::Impl {
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features) {
     StoredFeatures& places = stored();
-    writer_->add({detection, content, features});
+    writer_->add({content, detection, features});
     places.keep(places.size(), std::move(features));
     places.add(first_place_ + detection.frame, {session_, detection.frame});
     ++frames_;
