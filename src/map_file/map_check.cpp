@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -50,26 +52,10 @@ std::vector<MapSession> all_sessions(MapReader& map) {
 }
 
 /// A copy of a map whose first page, where the tables are listed, cannot be read, with that page
-/// from a new map: tables begin at the same pages in every map.
+/// from a new map: tables begin at the same pages in every map. Removed when this is.
 class RepairedCopy {
  public:
-  RepairedCopy(const std::string& from, const std::string& path) : path_(path) {
-    std::array<char, kMapPageBytes> page{};
-    {
-      const Database fresh = open_map_for_writing(path_);
-      close_log(fresh);
-    }
-    std::ifstream(path_, std::ios::binary).read(page.data(), page.size());
-    const auto pages = static_cast<std::uint32_t>(fs::file_size(from) / kMapPageBytes);
-    // sqlite.org/fileformat2.html, 1.3.7: the size in pages, big-endian.
-    for (std::size_t i = 0; i < 4; ++i) {
-      page.at(28 + i) = static_cast<char>(pages >> (24 - 8 * i));
-    }
-    fs::copy_file(from, path_, fs::copy_options::overwrite_existing);
-    std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
-    file.write(page.data(), page.size());
-    if (!file.flush()) throw cannot_write(path_, errno);
-  }
+  explicit RepairedCopy(std::string path) : path_(std::move(path)) {}
   ~RepairedCopy() {
     std::error_code error;
     for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(path_ + suffix, error);
@@ -79,9 +65,35 @@ class RepairedCopy {
   RepairedCopy(RepairedCopy&&) = delete;
   RepairedCopy& operator=(RepairedCopy&&) = delete;
 
+  /// Throws Error (kind output).
+  void make(const std::string& from) const {
+    const Page page = first_page(fs::file_size(from));
+    std::error_code error;
+    fs::copy_file(from, path_, fs::copy_options::overwrite_existing, error);
+    if (error) throw cannot_write(path_, error.value());
+    std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
+    file.write(page.data(), page.size());
+    if (!file.flush()) throw cannot_write(path_, errno);
+  }
+
   [[nodiscard]] const std::string& path() const { return path_; }
 
  private:
+  using Page = std::array<char, kMapPageBytes>;
+
+  /// Of a map without rows, but of so many bytes.
+  [[nodiscard]] Page first_page(std::uintmax_t bytes) const {
+    close_log(open_map_for_writing(path_));
+    Page page{};
+    std::ifstream(path_, std::ios::binary).read(page.data(), page.size());
+    // sqlite.org/fileformat2.html, 1.3.7: the size in pages, big-endian, at byte 28.
+    const auto pages = static_cast<std::uint32_t>(bytes / kMapPageBytes);
+    for (std::size_t i = 0; i < 4; ++i) {
+      page.at(28 + i) = static_cast<char>(pages >> (24 - 8 * i));
+    }
+    return page;
+  }
+
   std::string path_;
 };
 
@@ -135,7 +147,8 @@ MapCheck recover_map(const std::string& from, const std::string& to) {
     MapReader source(from);
     return copy_to_new(source, to);
   }
-  const RepairedCopy copy(from, to + ".part");
+  const RepairedCopy copy(to + ".part");
+  copy.make(from);
   MapReader source(copy.path());
   MapCheck check = copy_to_new(source, to);
   check.damage.insert(check.damage.begin(), "the file: its first page cannot be read");
