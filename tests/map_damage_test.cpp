@@ -129,6 +129,20 @@ TEST_F(MapDamage, WhatIsBehindADamagedPageIsRecovered) {
   expect_only_true_places(recovered);
 }
 
+TEST_F(MapDamage, AMapWithoutItsFirstPageIsRecovered) {
+  std::fill_n(bytes_.begin(), 16384, '\x5a');
+  const std::string file = write("damaged.db", bytes_);
+  expect_error(ErrorKind::input, {file, "check"}, [&] { const MapReader map(file); });
+  const MapCheck check = recover_map(file, path("recovered.db"));
+  EXPECT_EQ(check.places, kFrames);
+  EXPECT_EQ(check.sessions, 2);
+  EXPECT_EQ(check.loops, 1);
+  EXPECT_EQ(check.damage.size(), 1U);
+  EXPECT_FALSE(fs::exists(path("recovered.db.part")));
+  MapReader recovered(path("recovered.db"));
+  expect_only_true_places(recovered);
+}
+
 /// A limit on the size of files, as a full disk would be.
 class FullDisk {
  public:

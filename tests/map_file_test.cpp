@@ -44,6 +44,16 @@ TEST_F(MapFile, GivesBackWhatWasAdded) {
   EXPECT_TRUE(map.check_structure().empty());
 }
 
+TEST_F(MapFile, AFinishedSessionTakesNothingMore) {
+  MapWriter map(map_path_, fast_options(), "drive");
+  add_frame(map, 0);
+  map.finish();
+  map.finish();
+  expect_error(ErrorKind::option, {"finished"}, [&] { add_frame(map, 1); });
+  expect_error(ErrorKind::option, {"finished"}, [&] { (void)map.features(0); });
+  EXPECT_EQ(places_of(map_path_).size(), 1U);
+}
+
 TEST_F(MapFile, KeepsSessionsAndLoopsApart) {
   add_session(map_path_, 5, "first");
   add_session(map_path_, 6, "second", SessionFrame{1, 4});

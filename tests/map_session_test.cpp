@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 // A detector with a map: sessions, and what may not depend on there being one.
+#include <initializer_list>
 #include <memory>
 #include <string>
 #include <vector>
@@ -20,8 +21,9 @@ constexpr int kLap = 24;
 class MapSession : public ScratchTest {
  protected:
   /// Passes the places first to last, seen from `moved_px` beside, in a session of its own.
-  std::vector<Detection> drive(int first, int last, cv::Point moved_px = {0, 0}) {
-    const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+  std::vector<Detection> drive(int first, int last, cv::Point moved_px = {0, 0},
+                               const std::string& name = "map.db") {
+    const auto map = std::make_shared<MapWriter>(path(name), fast_options(), "drive");
     LoopDetector detector(fast_options(), map);
     std::vector<Detection> detections;
     for (int place = first; place <= last; ++place) {
@@ -124,20 +126,22 @@ TEST_F(MapSession, PlacesWithoutTheirFeaturesAreNeverMatched) {
   EXPECT_EQ(map->damage().size(), 1U);
 }
 
-TEST_F(MapSession, AgreementDoesNotReachFromSessionToSession) {
-  // Frame k of session 1 and frame k + 1 of session 2 show the same; what supports the one is no
-  // support for the other.
-  drive(0, 3);
-  drive(4, kLap - 1);
-  const auto detections = drive(4, kLap - 1, {2, 0});
-  EXPECT_EQ(detections.front().score, detections.front().score);
-  const auto alone = [&] {
-    const auto map = std::make_shared<MapReader>(path("map.db"));
-    const LoopDetector detector(map->options(), map);
-    return detector.query(view(4, {2, 0})).score;
-  }();
-  EXPECT_EQ(detections.front().score, alone);
-  EXPECT_GT(detections[2].score, static_cast<double>(0));
+TEST_F(MapSession, MatchesSupportEachOtherWithinASessionOnly) {
+  const auto last_session = [&](const std::string& map, std::initializer_list<int> ends) {
+    int first = 0;
+    for (const int end : ends) {
+      drive(first, end - 1, {0, 0}, map);
+      first = end;
+    }
+    return drive(8, 16, {6, 2}, map);
+  };
+  const auto one = last_session("one.db", {kLap});
+  const auto two = last_session("two.db", {12, kLap});
+  // Frame 4 shows place 12, the first of the second session.
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(one[i].score, two[i].score);
+  EXPECT_EQ(two[4].earlier_match, (SessionFrame{2, 0}));
+  EXPECT_LT(two[4].score, one[4].score);
+  EXPECT_EQ(two[8].score, one[8].score);
 }
 
 }  // namespace

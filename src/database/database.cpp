@@ -25,17 +25,24 @@ bool is_damage(int result) {
 
 Database::Database(std::string path, Access access, Remedies remedies)
     : path_(std::move(path)), access_(access), remedies_(std::move(remedies)) {
-  const int flags =
-      access == Access::create ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE : SQLITE_OPEN_READONLY;
+  // Readers may write, too, where the system lets them: what a killed writer began has to be undone
+  // before anything can be read.
+  const int flags = SQLITE_OPEN_READWRITE | (access == Access::create ? SQLITE_OPEN_CREATE : 0);
   sqlite3* handle = nullptr;
   const int result = sqlite3_open_v2(path_.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);  // must be closed even if it could not be opened
   if (result != SQLITE_OK) fail();
   sqlite3_busy_timeout(handle, kBusyTimeout_ms);
   sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kMaxRowBytes);
-  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  const bool reads = access == Access::read;
+  // A file that was cut is read as far as it goes, which SQLite allows only where the list of
+  // tables may be changed, too.
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, reads ? 0 : 1, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_WRITABLE_SCHEMA, reads ? 1 : 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, reads ? 1 : 0, nullptr);
   sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   execute("PRAGMA cell_size_check = ON; PRAGMA mmap_size = 0");
+  if (reads) execute("PRAGMA query_only = ON");
 }
 
 void Database::Close::operator()(sqlite3* handle) const { sqlite3_close(handle); }

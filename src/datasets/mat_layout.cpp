@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "mat_layout.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
@@ -11,6 +12,7 @@
 #include <system_error>
 
 #include <fmt/format.h>
+#include <zlib.h>
 
 namespace loopbit::datasets {
 namespace {
@@ -41,6 +43,45 @@ bool read(std::ifstream& stream, std::array<std::byte, size>& bytes) {
   return stream.good();
 }
 
+/// What follows the tag of a matrix: its flags, and the tag of its dimensions.
+constexpr std::size_t kMatrixStartBytes = 24;
+using MatrixStart = std::array<std::byte, kMatrixStartBytes>;
+
+/// libmatio takes memory for as many dimensions as a file says, up to 8 GB.
+bool has_sane_dimensions(const MatrixStart& start, bool little) {
+  constexpr std::uint32_t kInt32 = 5;
+  constexpr std::uint32_t kMaxDimensions = 32;
+  const std::uint32_t type = read_number(start.data() + 16, 4, little);
+  const std::uint32_t bytes = read_number(start.data() + 20, 4, little);
+  return type == kInt32 && bytes >= 8 && bytes <= 4 * kMaxDimensions;
+}
+
+/// The first bytes that `stream` unpacks to, without the tag of the matrix; false where there are
+/// not so many.
+bool unpack(std::ifstream& stream, std::uint32_t packed_bytes, MatrixStart& start) {
+  std::array<char, 512> packed{};
+  stream.read(packed.data(), std::min<std::streamsize>(packed_bytes, packed.size()));
+  std::array<std::byte, kTagBytes + kMatrixStartBytes> unpacked{};
+  z_stream zlib{};
+  if (inflateInit(&zlib) != Z_OK) return false;
+  zlib.next_in = reinterpret_cast<Bytef*>(packed.data());
+  zlib.avail_in = static_cast<uInt>(stream.gcount());
+  zlib.next_out = reinterpret_cast<Bytef*>(unpacked.data());
+  zlib.avail_out = static_cast<uInt>(unpacked.size());
+  inflate(&zlib, Z_SYNC_FLUSH);
+  inflateEnd(&zlib);
+  std::copy(unpacked.begin() + kTagBytes, unpacked.end(), start.begin());
+  return zlib.avail_out == 0;
+}
+
+/// Of the element whose tag was just read. An empty matrix has nothing to be wrong.
+bool is_sane_matrix(std::ifstream& stream, std::uint32_t type, std::uint32_t bytes, bool little) {
+  if (bytes == 0) return true;
+  MatrixStart start{};
+  const bool is_read = type == kCompressed ? unpack(stream, bytes, start) : read(stream, start);
+  return is_read && has_sane_dimensions(start, little);
+}
+
 /// Walks over the variables from the end of the header to `file_bytes`.
 std::string fault_of_elements(std::ifstream& stream, std::uintmax_t file_bytes, bool little) {
   std::uintmax_t at = kHeaderBytes;
@@ -58,6 +99,9 @@ std::string fault_of_elements(std::ifstream& stream, std::uintmax_t file_bytes, 
     at += kTagBytes;
     if (bytes > file_bytes - at) {
       return fmt::format("is cut off after {} bytes: copy it again", file_bytes);
+    }
+    if (!is_sane_matrix(stream, type, bytes, little)) {
+      return fmt::format("is damaged at byte {}: copy it again, or save it anew", at);
     }
     at += bytes;
   }

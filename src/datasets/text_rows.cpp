@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdint>
 #include <fstream>
 #include <system_error>
 
@@ -16,6 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30U;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 /// Fit for a one-line message: control characters are replaced, and a UTF-8 character is not cut.
@@ -38,6 +40,12 @@ std::string excerpt(std::string_view text) {
 }  // namespace
 
 std::vector<TextRow> read_rows(const fs::path& file) {
+  std::error_code error;
+  if (const auto bytes = fs::file_size(file, error); !error && bytes > kMaxFileBytes) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' has {} bytes, but at most {} of text are read: split it.",
+                            file.string(), bytes, kMaxFileBytes));
+  }
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw_unreadable(file);

@@ -346,7 +346,9 @@ class LoopDetector::Impl {
     return std::max(memory_.session_begin(), std::min(first, index_.size() - exclusion.min_frames));
   }
 
-  [[nodiscard]] auto rank(const VerifiedCandidate& v, const Observation& seen) const {
+  using Rank = std::tuple<double, int, double>;
+
+  [[nodiscard]] Rank rank(const VerifiedCandidate& v, const Observation& seen) const {
     return std::tuple(agreement_.score(v, seen.look.is_step), v.matches, v.candidate.similarity);
   }
 

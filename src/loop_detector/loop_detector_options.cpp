@@ -18,6 +18,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+/// Of a settings file.
+constexpr std::size_t kMaxBytes = std::size_t{1} << 20U;
+
 template <typename Visit>
 void for_each_setting(LoopDetectorOptions& options, Visit&& visit) {
   for_each_section(options, [&](std::string_view section, auto& part) {
@@ -128,8 +131,15 @@ LoopDetectorOptions options_from_json(const std::string& json, const std::string
 
 LoopDetectorOptions load_options(const std::string& path) {
   std::ifstream file(path);
-  std::string text;
-  std::getline(file, text, '\0');
+  std::string text(kMaxBytes + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kMaxBytes) {
+    throw Error(ErrorKind::input,
+                fmt::format("The settings file '{}' has more than {} bytes; name "
+                            "one that 'loopbit options --json' could have written.",
+                            path, kMaxBytes));
+  }
   if (!file.is_open() || file.bad()) {
     throw Error(
         ErrorKind::input,

@@ -20,8 +20,8 @@ namespace loopbit {
 
 /// A frame on its way to a map.
 struct AddedFrame {
-  Detection detection;
   BinaryContent content;
+  Detection detection;
   std::shared_ptr<const Features> features;
 };
 

@@ -127,10 +127,11 @@ class MapWriter::Impl {
   }
 
   void for_each_earlier_place(const Visit& visit) {
+    (void)stored();  // not after finish()
     for_each_place(
         *database_,
         [&](const MapPlace& place) {
-          stored_->add(place.id, place.at);
+          stored().add(place.id, place.at);
           visit(place.at, place.content);
         },
         damage_);
@@ -142,16 +143,17 @@ class MapWriter::Impl {
   }
 
   std::shared_ptr<const Features> features(PlaceId place) {
-    if (auto found = stored_->find(place)) return found;
+    if (auto found = stored().find(place)) return found;
     if (auto pending = writer_->pending(place - session_begin())) return pending;
-    return stored_->get(place, damage_);
+    return stored().get(place, damage_);
   }
 
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features) {
-    writer_->add({detection, content, features});
-    stored_->keep(stored_->size(), std::move(features));
-    stored_->add(first_place_ + detection.frame, {session_, detection.frame});
+    StoredFeatures& places = stored();
+    writer_->add({content, detection, features});
+    places.keep(places.size(), std::move(features));
+    places.add(first_place_ + detection.frame, {session_, detection.frame});
     ++frames_;
   }
 
@@ -179,7 +181,18 @@ class MapWriter::Impl {
     return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_);
   }
 
-  [[nodiscard]] PlaceId session_begin() const { return stored_->size() - frames_; }
+  /// Throws Error (kind option) after finish().
+  StoredFeatures& stored() {
+    if (!stored_) {
+      throw Error(ErrorKind::option,
+                  fmt::format("Session {} of its map is finished: nothing can be added to it or "
+                              "asked; open the map again.",
+                              session_));
+    }
+    return *stored_;
+  }
+
+  [[nodiscard]] PlaceId session_begin() { return stored().size() - frames_; }
 
   WriterLock lock_;
   int session_ = 0;

@@ -12,11 +12,11 @@
 namespace loopbit {
 namespace {
 
-/// Behind a page that cannot be read, so many keys are tried for the next one that can: a thousand
-/// in turn, then in growing steps, 200,000 keys in all. A damaged page of contents holds 29 rows,
-/// one of the pages above it some 50,000.
-constexpr std::int64_t kMaxProbes = 20'000;
-constexpr std::int64_t kProbesPerStep = 1000;
+/// Behind a page that cannot be read, so many keys are tried for the next one that can: ten in
+/// turn, then in steps that grow to 100, 51,000 keys in all. A damaged page of contents holds 29
+/// rows, one of the pages above it some 50,000.
+constexpr std::int64_t kMaxProbes = 1000;
+constexpr std::int64_t kProbesPerStep = 10;
 
 /// Calls visit(row, key) for each row of `table` that can be read, in order of its key, which is
 /// the first of `columns`.

@@ -13,9 +13,6 @@
 namespace loopbit {
 namespace {
 
-/// Large pages: features take 48 KB a place, contents are read one after the other.
-constexpr int kPageBytes = 16384;
-
 struct Table {
   const char* name;
   const char* definition;  ///< as SQLite keeps it
@@ -39,6 +36,9 @@ constexpr std::array kTables{
           "NULL, similarity REAL NOT NULL, matches INTEGER NOT NULL, inliers INTEGER NOT NULL, "
           "checksum INTEGER NOT NULL)"}};
 
+/// SQLite makes it for AUTOINCREMENT.
+constexpr Table kSequences{"sqlite_sequence", "CREATE TABLE sqlite_sequence(name,seq)"};
+
 void create_tables(const Database& database) {
   for (const Table& table : kTables) database.execute(table.definition);
 }
@@ -47,13 +47,13 @@ void create_tables(const Database& database) {
 using Migration = void (*)(const Database&);
 constexpr std::array<Migration, kMapVersion> kMigrations{create_tables};
 
-Database::Remedies remedies() {
+Database::Remedies remedies(const std::string& path) {
   return {.write =
               "check the free space and the permissions of its folder, then run again with the "
               "same map: what was saved before is kept",
-          .read =
-              "it is missing, damaged or no map of loopbit's; 'loopbit map check' says what is "
-              "left of a damaged one"};
+          .read = fmt::format("it is no map of loopbit's, or damaged; 'loopbit map check {} "
+                              "--recover NEW.db' saves what is left of a damaged one",
+                              path)};
 }
 
 [[noreturn]] void refuse(const Database& database, const std::string& why) {
@@ -62,7 +62,7 @@ Database::Remedies remedies() {
 
 /// A map has the tables of its version and no others: no view or trigger of a stranger is run.
 void check_tables(const Database& database) {
-  Statement rows(database, "SELECT name, sql FROM sqlite_schema WHERE name NOT LIKE 'sqlite_%'");
+  Statement rows(database, "SELECT name, sql FROM sqlite_schema");
   std::size_t known = 0;
   while (rows.step()) {
     const std::string name = rows.text(0);
@@ -70,14 +70,15 @@ void check_tables(const Database& database) {
     const auto is_this = [&](const Table& table) {
       return name == table.name && sql == table.definition;
     };
-    if (std::none_of(kTables.begin(), kTables.end(), is_this)) {
+    if (!is_this(kSequences) && std::none_of(kTables.begin(), kTables.end(), is_this)) {
       refuse(database, fmt::format("has a table '{}' that no map of version {} has: it was changed "
                                    "by something else; use a copy from before",
                                    name, kMapVersion));
     }
     ++known;
   }
-  if (known != kTables.size()) refuse(database, "lacks tables of a map: use a copy from before");
+  if (known != kTables.size() + 1)
+    refuse(database, "lacks tables of a map: use a copy from before");
 }
 
 /// The version of the map; 0 for an empty file.
@@ -111,8 +112,8 @@ void migrate(const Database& database, int version) {
 }  // namespace
 
 Database open_map_for_writing(const std::string& path) {
-  Database database(path, Database::Access::create, remedies());
-  database.execute(fmt::format("PRAGMA page_size = {}", kPageBytes));
+  Database database(path, Database::Access::create, remedies(path));
+  database.execute(fmt::format("PRAGMA page_size = {}", kMapPageBytes));
   migrate(database, checked_version(database));
   check_tables(database);
   // Each commit is on disk when it returns (sqlite.org/wal.html, "Performance Considerations").
@@ -126,7 +127,7 @@ Database open_map_for_reading(const std::string& path) {
         ErrorKind::input,
         fmt::format("There is no map '{}'; 'loopbit run INPUT --map {}' makes one.", path, path));
   }
-  Database database(path, Database::Access::read, remedies());
+  Database database(path, Database::Access::read, remedies(path));
   if (checked_version(database) == 0) {
     refuse(database, "is empty; 'loopbit run INPUT --map' fills it");
   }

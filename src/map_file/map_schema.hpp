@@ -14,6 +14,9 @@ inline constexpr int kMapApplicationId = 0x6c6f6f70;
 /// The version of the format that this library writes. It reads, after migration, all before.
 inline constexpr int kMapVersion = 1;
 
+/// Large pages: features take 48 KB a place, contents are read one after the other.
+inline constexpr int kMapPageBytes = 16384;
+
 /// Opens a map to be written, made if there is none or an empty file, and brought to kMapVersion.
 /// What is committed survives the loss of power. Throws Error (kind input) if the file is no map,
 /// of a newer version or damaged where its tables are listed, (kind output) if it cannot be

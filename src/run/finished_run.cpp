@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -22,7 +23,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::uintmax_t kMaxBytes = std::uintmax_t{1} << 30U;
+
 std::string read_text(const fs::path& path) {
+  std::error_code error;
+  if (const auto bytes = fs::file_size(path, error); !error && bytes > kMaxBytes) {
+    throw Error(ErrorKind::input, fmt::format("'{}' has {} bytes, but at most {} are read: it was "
+                                              "not written by loopbit.",
+                                              path.string(), bytes, kMaxBytes));
+  }
   std::ifstream file(path, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(file), {}};
   if (file.bad() || !file.is_open()) {

@@ -63,6 +63,10 @@ class MapReader : public MapStorage {
   /// its tables are listed. Reads the sessions only.
   explicit MapReader(const std::string& path);
   ~MapReader() override;
+  MapReader(const MapReader&) = delete;
+  MapReader& operator=(const MapReader&) = delete;
+  MapReader(MapReader&&) = delete;
+  MapReader& operator=(MapReader&&) = delete;
 
   [[nodiscard]] const std::vector<MapSession>& sessions() const;
 
@@ -115,6 +119,10 @@ class MapWriter : public MapStorage {
   MapWriter(const std::string& path, const LoopDetectorOptions& options, const std::string& name);
   /// Saves as finish() does, if it was not called, and swallows its error.
   ~MapWriter() override;
+  MapWriter(const MapWriter&) = delete;
+  MapWriter& operator=(const MapWriter&) = delete;
+  MapWriter(MapWriter&&) = delete;
+  MapWriter& operator=(MapWriter&&) = delete;
 
   /// The number of the session that is written.
   [[nodiscard]] int session() const;
@@ -126,7 +134,8 @@ class MapWriter : public MapStorage {
   void flush();
 
   /// Commits the rest and closes the file, which then is one file without a log beside it. Throws
-  /// Error (kind output). Nothing may be added afterwards.
+  /// Error (kind output). A detector of this map is of no use afterwards: what it asks for throws
+  /// Error (kind option).
   void finish();
 
   /// Throws Error (kind input) where a place is damaged: a damaged map is not written to.

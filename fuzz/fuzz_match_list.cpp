@@ -1,0 +1,11 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/match_list.hpp"
+
+#include "fuzz_file.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  loopbit::fuzz::read_as_file(
+      data, size, ".csv", [](const std::string& path) { (void)loopbit::read_match_list(path); });
+  return 0;
+}

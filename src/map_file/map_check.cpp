@@ -1,0 +1,158 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/map_tools.hpp"
+
+#include "map_copy.hpp"
+#include "map_schema.hpp"
+#include "writer_lock.hpp"
+
+namespace loopbit {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Sessions whose description is lost are given one.
+std::vector<MapSession> all_sessions(MapReader& map) {
+  std::map<int, MapSession> sessions;
+  for (const MapSession& session : map.sessions()) sessions[session.session] = session;
+  if (sessions.empty()) return {};  // nothing says what the places were made with
+  const MapSession pattern = sessions.begin()->second;
+  map.for_each_place([&](const MapPlace& place) {
+    auto [found, is_new] = sessions.try_emplace(place.at.session, pattern);
+    MapSession& session = found->second;
+    if (is_new) {
+      session.session = place.at.session;
+      session.uid += fmt::format("-recovered-{}", place.at.session);
+      session.name = "recovered";
+      session.frames = 0;
+    }
+    session.frames = std::max<std::int64_t>(session.frames, place.at.frame + 1);
+  });
+  std::vector<MapSession> list;
+  list.reserve(sessions.size());
+  for (const auto& [number, session] : sessions) list.push_back(session);
+  return list;
+}
+
+/// A copy of a map whose first page, where the tables are listed, cannot be read, with that page
+/// from a new map: tables begin at the same pages in every map. Removed when this is.
+class RepairedCopy {
+ public:
+  explicit RepairedCopy(std::string path) : path_(std::move(path)) {}
+  ~RepairedCopy() {
+    std::error_code error;
+    for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(path_ + suffix, error);
+  }
+  RepairedCopy(const RepairedCopy&) = delete;
+  RepairedCopy& operator=(const RepairedCopy&) = delete;
+  RepairedCopy(RepairedCopy&&) = delete;
+  RepairedCopy& operator=(RepairedCopy&&) = delete;
+
+  /// Throws Error (kind output).
+  void make(const std::string& from) const {
+    const Page page = first_page(fs::file_size(from));
+    std::error_code error;
+    fs::copy_file(from, path_, fs::copy_options::overwrite_existing, error);
+    if (error) throw cannot_write(path_, error.value());
+    std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
+    file.write(page.data(), page.size());
+    if (!file.flush()) throw cannot_write(path_, errno);
+  }
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  using Page = std::array<char, kMapPageBytes>;
+
+  /// Of a map without rows, but of so many bytes.
+  [[nodiscard]] Page first_page(std::uintmax_t bytes) const {
+    close_log(open_map_for_writing(path_));
+    Page page{};
+    std::ifstream(path_, std::ios::binary).read(page.data(), page.size());
+    // sqlite.org/fileformat2.html, 1.3.7: the size in pages, big-endian, at byte 28.
+    const auto pages = static_cast<std::uint32_t>(bytes / kMapPageBytes);
+    for (std::size_t i = 0; i < 4; ++i) {
+      page.at(28 + i) = static_cast<char>(pages >> (24 - 8 * i));
+    }
+    return page;
+  }
+
+  std::string path_;
+};
+
+MapCheck copy_to_new(MapReader& source, const std::string& to) {
+  const std::vector<MapSession> sessions = all_sessions(source);
+  const WriterLock lock(to);
+  const Database database = open_map_for_writing(to);
+  MapCheck counts = copy_whole(source, sessions, database, [](const MapPlace&) { return true; });
+  counts.damage = source.damage();
+  close_log(database);
+  return counts;
+}
+
+bool can_be_opened(const std::string& path) {
+  try {
+    const MapReader map(path);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+}  // namespace
+
+MapCheck check_map(const std::string& path) {
+  MapReader map(path);
+  MapCheck check{.sessions = static_cast<std::int64_t>(map.sessions().size())};
+  std::set<int> described;
+  for (const MapSession& session : map.sessions()) described.insert(session.session);
+  std::set<int> undescribed;
+  map.for_each_place([&](const MapPlace& place) {
+    if (!described.contains(place.at.session)) undescribed.insert(place.at.session);
+    if (map.features_of(place)) ++check.places;
+  });
+  check.loops = static_cast<std::int64_t>(map.loops().size());
+  check.damage = map.damage();
+  for (const int session : undescribed) {
+    check.damage.push_back(fmt::format("session {}: its description is missing", session));
+  }
+  for (const std::string& fault : map.check_structure()) {
+    check.damage.push_back(fmt::format("the file: {}", fault));
+  }
+  return check;
+}
+
+MapCheck recover_map(const std::string& from, const std::string& to) {
+  if (fs::exists(to)) {
+    throw Error(ErrorKind::output, fmt::format("'{}' exists; name a new file to recover to.", to));
+  }
+  if (can_be_opened(from) || !fs::is_regular_file(from) || fs::file_size(from) < kMapPageBytes) {
+    MapReader source(from);
+    return copy_to_new(source, to);
+  }
+  const RepairedCopy copy(to + ".part");
+  copy.make(from);
+  MapReader source(copy.path());
+  MapCheck check = copy_to_new(source, to);
+  check.damage.insert(check.damage.begin(), "the file: its first page cannot be read");
+  return check;
+}
+
+}  // namespace loopbit

@@ -1,0 +1,135 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <map>
+#include <set>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/map_tools.hpp"
+
+#include "map_copy.hpp"
+#include "map_schema.hpp"
+#include "thinning.hpp"
+#include "writer_lock.hpp"
+
+namespace loopbit {
+namespace {
+
+namespace fs = std::filesystem;
+
+using FrameKey = std::pair<int, int>;
+
+FrameKey key_of(const SessionFrame& at) { return {at.session, at.frame}; }
+
+/// The places that `options` leave, by id.
+std::set<std::int64_t> remaining(MapReader& map, const CompactOptions& options) {
+  const std::set<int> dropped(options.drop_sessions.begin(), options.drop_sessions.end());
+  std::vector<ThinnedPlace> places;
+  std::vector<std::int64_t> ids;
+  std::map<FrameKey, std::size_t> index;
+  map.for_each_place([&](const MapPlace& place) {
+    if (dropped.contains(place.at.session)) return;
+    index[key_of(place.at)] = places.size();
+    places.push_back({place.content, place.at.session});
+    ids.push_back(place.id);
+  });
+  if (options.max_places > 0) {
+    for (const MapLoop& loop : map.loops()) {
+      const auto query = index.find(key_of(loop.query));
+      const auto match = index.find(key_of(loop.match));
+      if (query != index.end() && match != index.end() && query != match) {
+        places[query->second].loop = match->second;
+      }
+    }
+    const auto kept = kept_places(places, static_cast<std::size_t>(options.max_places));
+    std::size_t position = 0;
+    std::erase_if(ids, [&](std::int64_t) { return !kept[position++]; });
+  }
+  return {ids.begin(), ids.end()};
+}
+
+std::vector<MapSession> sessions_but(const MapReader& map, const std::vector<int>& dropped) {
+  std::vector<MapSession> sessions = map.sessions();
+  for (const int number : dropped) {
+    const auto removed = std::erase_if(
+        sessions, [&](const MapSession& session) { return session.session == number; });
+    if (removed == 0) {
+      throw Error(ErrorKind::option, fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' "
+                                                 "shows those there are.",
+                                                 map.path(), number));
+    }
+  }
+  return sessions;
+}
+
+/// Keys are never given twice, not even those of what was dropped last.
+void keep_sequences(const Database& from, const Database& to) {
+  for (const char* table : {"session", "place"}) {
+    const auto last =
+        from.integer(fmt::format("SELECT seq FROM sqlite_sequence WHERE name = '{}'", table));
+    to.execute(
+        fmt::format("DELETE FROM sqlite_sequence WHERE name = '{0}'; INSERT INTO "
+                    "sqlite_sequence VALUES ('{0}', {1})",
+                    table, last));
+  }
+}
+
+/// Writes what remains of the map at `path` to the new file `part`.
+void write_compact(const std::string& path, const std::string& part, const CompactOptions& options,
+                   CompactCounts& counts) {
+  MapReader map(path);
+  const auto sessions = sessions_but(map, options.drop_sessions);
+  const auto kept = remaining(map, options);
+  map.for_each_place([&](const MapPlace&) { ++counts.places_before; });
+  const Database old = open_map_for_reading(path);
+  const Database compact = open_map_for_writing(part);
+  counts.places_after = copy_whole(map, sessions, compact, [&](const MapPlace& place) {
+                          return kept.contains(place.id);
+                        }).places;
+  refuse_damaged(map);
+  keep_sequences(old, compact);
+  close_log(compact);
+}
+
+/// The log of the old file would be taken for the new one's.
+void check_unused(const std::string& path) {
+  const Database old = open_map_for_writing(path);
+  if (close_log(old)) return;
+  throw Error(ErrorKind::output,
+              fmt::format("'{}' is being read by another process; end that, then compact again. "
+                          "Nothing was changed.",
+                          path));
+}
+
+}  // namespace
+
+CompactCounts compact_map(const std::string& path, const CompactOptions& options) {
+  const WriterLock lock(path);
+  const std::string part = path + ".compact";
+  const auto remove_part = [&] {
+    std::error_code error;
+    for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(part + suffix, error);
+  };
+  remove_part();
+  CompactCounts counts;
+  try {
+    write_compact(path, part, options, counts);
+    check_unused(path);
+  } catch (const Error&) {
+    remove_part();
+    throw;
+  }
+  counts.bytes_before = fs::file_size(path);
+  counts.bytes_after = fs::file_size(part);
+  std::error_code error;
+  fs::rename(part, path, error);
+  if (error) throw cannot_write(path, error.value());
+  return counts;
+}
+
+}  // namespace loopbit

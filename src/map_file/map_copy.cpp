@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "map_copy.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+namespace loopbit {
+namespace {
+
+constexpr std::int64_t kPlacesPerTransaction = 2048;
+
+}  // namespace
+
+MapCopy::MapCopy(const Database& to, std::map<int, int> numbers)
+    : rows_(to), numbers_(std::move(numbers)) {}
+
+void MapCopy::copy_session(MapSession session) {
+  session.session = numbers_.at(session.session);
+  rows_.write(session);
+}
+
+bool MapCopy::copy_place(const MapPlace& place, const Features& features) {
+  MapPlace copy = place;
+  if (!renumber(copy.at)) return false;
+  rows_.write(copy, features);
+  return true;
+}
+
+bool MapCopy::copy_loop(MapLoop loop) {
+  if (!renumber(loop.query) || !renumber(loop.match)) return false;
+  rows_.write(loop);
+  return true;
+}
+
+bool MapCopy::renumber(SessionFrame& at) const {
+  const auto found = numbers_.find(at.session);
+  if (found == numbers_.end()) return false;
+  at.session = found->second;
+  return true;
+}
+
+MapCheck copy_whole(MapReader& from, const std::vector<MapSession>& sessions, const Database& to,
+                    const std::function<bool(const MapPlace&)>& keeps) {
+  std::map<int, int> numbers;
+  for (const MapSession& session : sessions) numbers[session.session] = session.session;
+  MapCopy copy(to, std::move(numbers));
+  MapCheck counts;
+  to.execute("BEGIN IMMEDIATE");
+  for (const MapSession& session : sessions) copy.copy_session(session);
+  counts.sessions = static_cast<std::int64_t>(sessions.size());
+  from.for_each_place([&](const MapPlace& place) {
+    if (!keeps(place)) return;
+    const auto features = from.features_of(place);
+    if (!features || !copy.copy_place(place, *features)) return;
+    if (++counts.places % kPlacesPerTransaction == 0) to.execute("COMMIT; BEGIN IMMEDIATE");
+  });
+  for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);
+  to.execute("COMMIT");
+  return counts;
+}
+
+void refuse_damaged(const MapReader& map) {
+  if (map.damage().empty()) return;
+  throw Error(ErrorKind::input,
+              fmt::format("'{0}' is damaged ({1}, {2} in all); 'loopbit map check {0} --recover "
+                          "NEW.db' saves the rest in a new map first.",
+                          map.path(), map.damage().front(), map.damage().size()));
+}
+
+bool close_log(const Database& database) {
+  Statement statement(database, "PRAGMA journal_mode = DELETE");
+  return statement.step_if_readable() == Statement::Step::row && statement.text(0) == "delete";
+}
+
+}  // namespace loopbit

@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "loopbit/map_tools.hpp"
+
+#include "map_copy.hpp"
+#include "map_options.hpp"
+#include "map_schema.hpp"
+#include "writer_lock.hpp"
+
+namespace loopbit {
+namespace {
+
+/// Which sessions go where.
+struct MergePlan {
+  std::map<int, int> numbers;     ///< of each session in the other map: in this one
+  std::vector<MapSession> added;  ///< those that this one lacks
+  std::int64_t known = 0;         ///< the others
+};
+
+/// Throws Error (kind option) where settings differ.
+MergePlan plan_of(const std::string& into, const Database& to, const MapReader& source) {
+  Damage damage;
+  std::map<std::string, int> known;
+  std::string options;
+  for (const MapSession& session : read_sessions(to, damage)) {
+    known[session.uid] = session.session;
+    options = session.options;
+  }
+  MergePlan plan;
+  int next = next_session(to);
+  for (const MapSession& session : source.sessions()) {
+    if (options.empty()) options = session.options;
+    check_same_shape(into, options, options_of_shape(source.path(), session.options));
+    const auto found = known.find(session.uid);
+    const bool is_known = found != known.end();
+    plan.numbers[session.session] = is_known ? found->second : next++;
+    if (is_known) {
+      ++plan.known;
+    } else {
+      plan.added.push_back(session);
+    }
+  }
+  return plan;
+}
+
+}  // namespace
+
+MergeCounts merge_map(const std::string& into, const std::string& from) {
+  MapReader source(from);
+  const WriterLock lock(into);
+  const Database to = open_map_for_writing(into);
+  const MergePlan plan = plan_of(into, to, source);
+  std::set<int> added;
+  for (const MapSession& session : plan.added) added.insert(session.session);
+
+  MergeCounts counts{.sessions = static_cast<std::int64_t>(added.size()), .known = plan.known};
+  MapCopy copy(to, plan.numbers);
+  std::int64_t id = next_place(to);
+  to.execute("BEGIN IMMEDIATE");
+  for (const MapSession& session : plan.added) copy.copy_session(session);
+  source.for_each_place([&](const MapPlace& place) {
+    if (!added.contains(place.at.session)) return;
+    const auto features = source.features_of(place);
+    if (!features) return;
+    MapPlace copied = place;
+    copied.id = id++;
+    counts.places += copy.copy_place(copied, *features);
+  });
+  for (const MapLoop& loop : source.loops()) {
+    if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
+  }
+  refuse_damaged(source);  // which leaves the transaction: nothing is copied
+  to.execute("COMMIT");
+  close_log(to);
+  return counts;
+}
+
+}  // namespace loopbit

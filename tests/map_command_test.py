@@ -1,0 +1,223 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""Maps as a user meets them: loopbit run --map, query and map."""
+
+import json
+import pathlib
+import re
+import shutil
+import signal
+import sqlite3
+import subprocess
+import time
+import unittest
+
+from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, loopbit, rows
+
+LAP = FRAMES // 2
+
+
+class MapCommandTest(CommandTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        # Two laps as two sessions.
+        images = sorted(cls.images.iterdir())
+        cls.laps = []
+        for number, files in enumerate((images[:LAP], images[LAP:]), start=1):
+            folder = cls.shared / f"lap{number}"
+            folder.mkdir()
+            for file in files:
+                shutil.copy(file, folder)
+            cls.laps.append(folder)
+        cls.made = cls.shared / "made"
+        cls.made.mkdir()
+        cls.map = cls.made / "town.db"
+        cls.runs = [loopbit("run", lap, "--map", cls.map, "--no-report") for lap in cls.laps]
+        for ran in cls.runs:
+            assert ran.returncode == 0, ran.stderr
+
+    def copy_of_map(self):
+        return pathlib.Path(shutil.copy(self.map, self.scratch / "copy.db"))
+
+    def test_a_run_continues_the_map_and_leaves_a_folder_beside_it(self):
+        self.assertIn(f"{self.map}, session 2", self.runs[1].stdout)
+        record = json.loads((self.made / "town_session_2/run.json").read_text())
+        self.assertEqual(record["map"], {"path": str(self.map), "session": 2})
+        self.assertFalse(list(self.made.glob("town.db-*")), "the log is left")
+        self.assertFalse(list(self.made.glob("*.lock")))
+
+    @unittest.skipIf(QUICK, "too few frames")
+    def test_the_second_lap_is_recognised_as_session_and_frame(self):
+        found = rows(self.made / "town_session_2")
+        earlier = [row for row in found
+                   if row["status"] == "loop" and re.fullmatch(r"1:\d+", row["match"])]
+        self.assertGreater(len(earlier), len(found) / 2)
+
+    def test_a_run_with_a_map_can_be_scored_and_shown(self):
+        run = self.made / "town_session_2"
+        truth = self.scratch / "truth.csv"
+        truth.write_text("5,1,2\n")
+        self.assertEqual(loopbit("report", run, "--out", self.scratch / "page.html").returncode, 0)
+        for scored in (run, run / "loops.csv"):
+            ran = loopbit("eval", scored, "--truth", truth)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+
+    def test_neither_folder_nor_map_is_an_error(self):
+        self.assert_fails(loopbit("run", self.laps[0]), 2, "--out", "--map")
+
+    def test_other_settings_are_refused_before_anything_is_written(self):
+        ran = loopbit("run", self.laps[0], "--map", self.map, "--out", self.out, "--set",
+                      "surf.max_keypoints=100")
+        self.assert_fails(ran, 2, self.map, "surf.max_keypoints", "600", "100")
+        self.assertFalse(self.out.exists())
+
+    def test_a_second_writer_is_refused_and_readers_are_not(self):
+        copy = self.copy_of_map()
+        holder = subprocess.Popen(
+            [LOOPBIT, "run", self.images, "--map", copy, "--out", self.scratch / "holder"],
+            stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            for _ in range(200):
+                if (self.scratch / "holder/loops.csv").exists():
+                    break
+                time.sleep(0.02)
+            holder.send_signal(signal.SIGSTOP)
+            self.assert_fails(loopbit("run", self.images, "--map", copy, "--out", self.out), 4,
+                              copy, "being written")
+            self.assertEqual(loopbit("map", "list", copy).returncode, 0)
+            self.assertEqual(loopbit("query", copy, self.laps[0] / "000003.png").returncode, 0)
+        finally:
+            holder.kill()
+            holder.wait()
+        # Nothing stale is left by the kill.
+        ran = loopbit("run", self.few_images(), "--map", copy, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+
+    def test_an_interrupt_saves_what_was_seen(self):
+        path = self.scratch / "cut.db"
+        process = subprocess.Popen([LOOPBIT, "run", self.images, "--map", path, "--out", self.out],
+                                   stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL)
+        while not (self.out / "loops.csv").exists() or len(rows(self.out)) < 5:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        self.assertIn(process.wait(), (0, 130))
+        sessions = json.loads(loopbit("map", "list", path, "--json").stdout)
+        self.assertEqual([s["places"] for s in sessions], [len(rows(self.out))])
+
+    # query
+
+    def test_query_answers_in_a_table_and_in_json(self):
+        image = self.laps[0] / "000007.png"
+        table = loopbit("query", self.map, image)
+        self.assertEqual(table.returncode, 0, table.stderr)
+        first = table.stdout.splitlines()[1].split()
+        self.assertEqual(first[:4], ["000007.png", "loop", "1", "7"])
+        ran = loopbit("query", self.map, image, "--json", "--places", "2")
+        answer = json.loads(ran.stdout)
+        self.assertEqual(answer["status"], "loop")
+        self.assertEqual(len(answer["places"]), 2)
+        self.assertEqual((answer["places"][0]["session"], answer["places"][0]["frame"]), (1, 7))
+
+    def test_query_goes_on_after_an_unreadable_image(self):
+        broken = self.scratch / "broken.png"
+        broken.write_text("no image")
+        ran = loopbit("query", self.map, broken, self.laps[0] / "000001.png", "--json")
+        self.assertEqual(ran.returncode, 0)
+        answers = [json.loads(line) for line in ran.stdout.splitlines()]
+        self.assertEqual([a["status"] for a in answers], ["unreadable", "loop"])
+        self.assertIn("broken.png", ran.stderr)
+        self.assertEqual(loopbit("query", self.map, broken).returncode, 3)
+
+    def test_query_says_what_is_missing(self):
+        self.assert_fails(loopbit("query", self.scratch / "none.db", "x.png"), 3, "none.db", "--map")
+        self.assert_fails(loopbit("query", self.map), 2, "--watch")
+        self.assert_fails(loopbit("query", self.map, "x.png", "--set", "surf.upright=false"), 2,
+                          "surf.upright", self.map)
+
+    def test_watch_answers_images_as_they_come(self):
+        folder = self.scratch / "incoming"
+        folder.mkdir()
+        with subprocess.Popen([LOOPBIT, "query", self.map, "--watch", folder, "--json"],
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True) as watch:
+            for name in ("000004.png", "000009.png"):
+                shutil.copy(self.laps[0] / name, folder)
+                answer = json.loads(watch.stdout.readline())
+                self.assertEqual(answer["image"], name)
+                self.assertEqual(answer["places"][0]["frame"], int(name[:6]))
+            watch.send_signal(signal.SIGINT)
+            self.assertEqual(watch.wait(), 0)
+
+    # map
+
+    def test_info_and_list(self):
+        info = json.loads(loopbit("map", "info", self.map, "--json").stdout)
+        self.assertEqual((info["sessions"], info["places"]), (2, FRAMES))
+        self.assertEqual(info["options"]["surf"]["max_keypoints"], 600)
+        self.assertIn("sessions   2", loopbit("map", "info", self.map).stdout)
+        sessions = json.loads(loopbit("map", "list", self.map, "--json").stdout)
+        self.assertEqual([s["name"] for s in sessions], [str(lap) for lap in self.laps])
+        self.assertEqual([s["frames"] for s in sessions], [LAP, FRAMES - LAP])
+        self.assertIn(sessions[1]["uid"], loopbit("map", "list", self.map).stdout)
+
+    @unittest.skipIf(QUICK, "too few frames")
+    def test_an_export_is_what_eval_reads(self):
+        edges = self.scratch / "edges.csv"
+        self.assertEqual(loopbit("map", "export", self.map, "--out", edges).returncode, 0)
+        ran = loopbit("eval", edges, "--truth", self.dataset / "truth.csv", "--not-false",
+                      self.dataset / "not_false.csv", "--json")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertGreater(json.loads(ran.stdout)["recall"], 0.5)
+        loops = json.loads(loopbit("map", "export", self.map, "--format", "json").stdout)["loops"]
+        self.assertEqual(len(loops), len(edges.read_text().splitlines()) - 1)
+        g2o = loopbit("map", "export", self.map, "--format", "g2o").stdout.splitlines()
+        self.assertEqual(sum(line.startswith("EDGE_SE3:QUAT") for line in g2o), len(loops))
+
+    def test_merge_compact_and_check(self):
+        merged = self.scratch / "merged.db"
+        self.assertIn("2 sessions", loopbit("map", "merge", merged, self.map).stdout)
+        self.assertIn("2 sessions were there", loopbit("map", "merge", merged, self.map).stdout)
+        self.assertIn(f"{FRAMES} places", loopbit("map", "check", merged).stdout)
+        self.assertIn(f"20 of {FRAMES} kept",
+                      loopbit("map", "compact", merged, "--budget", 20).stdout)
+        self.assertEqual(loopbit("map", "compact", merged, "--drop", 1).returncode, 0)
+        sessions = json.loads(loopbit("map", "list", merged, "--json").stdout)
+        self.assertEqual([s["session"] for s in sessions], [2])
+        self.assert_fails(loopbit("map", "compact", merged), 2, "--drop", "--budget")
+        self.assert_fails(loopbit("map", "compact", merged, "--drop", 9), 2, "session 9")
+
+    def test_damage_is_listed_recovered_and_never_written_to(self):
+        copy = self.copy_of_map()
+        with sqlite3.connect(copy) as database:
+            database.execute("UPDATE place SET frame = 99 WHERE place = 5")
+        database.close()
+        check = loopbit("map", "check", copy)
+        self.assertEqual(check.returncode, 3)
+        self.assertIn("place 5", check.stdout)
+        self.assert_fails(loopbit("run", self.laps[0], "--map", copy, "--out", self.out), 3,
+                          "place 5", "--recover")
+        asked = loopbit("query", copy, self.laps[0] / "000009.png")
+        self.assertEqual(asked.returncode, 0)
+        self.assertIn("place 5", asked.stderr)
+        recovered = self.scratch / "recovered.db"
+        self.assertIn(f"{FRAMES - 1} places",
+                      loopbit("map", "check", copy, "--recover", recovered).stdout)
+        self.assertEqual(loopbit("map", "check", recovered).returncode, 0)
+
+    def test_files_that_are_no_maps_are_named(self):
+        text = self.scratch / "text.db"
+        text.write_text("no map " * 1000)
+        newer = self.copy_of_map()
+        with sqlite3.connect(newer) as database:
+            database.execute("PRAGMA user_version = 99")
+        database.close()
+        for command in (["info"], ["list"], ["export"], ["check"], ["compact", "--drop", "1"]):
+            self.assert_fails(loopbit("map", command[0], text, *command[1:]), 3, text)
+            self.assert_fails(loopbit("map", command[0], newer, *command[1:]), 3, "version 99")
+        self.assert_fails(loopbit("map", "merge", newer, self.map), 3, "version 99")
+
+
+if __name__ == "__main__":
+    unittest.main()
