@@ -1,0 +1,31 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <opencv2/core/utils/logger.hpp>
+#include <pybind11/pybind11.h>
+
+#include "loopbit/kernels.hpp"
+#include "loopbit/version.hpp"
+
+#include "bindings.hpp"
+
+PYBIND11_MODULE(_loopbit, module) {
+  using namespace loopbit::python;
+  module.doc() = "The compiled part of loopbit; import loopbit instead.";
+  module.attr("__version__") = loopbit::kVersion;
+  // Bad images are reported by loopbit, in its own words.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  bind_errors(module);
+  module.def(
+      "active_kernel", [] { return std::string(loopbit::active_kernels().name); },
+      "The instruction set whose inner loops run: scalar, avx2 or avx512; LOOPBIT_KERNEL forces "
+      "one.");
+  bind_content(module);
+  bind_features(module);
+  bind_place_index(module);
+  bind_detector(module);
+  bind_data(module);
+  bind_evaluation(module);
+  bind_world(module);
+  bind_run(module);
+  bind_report(module);
+}
