@@ -186,6 +186,12 @@ void bind_content(py::module_& module) {
       py::arg("image"), default_options,
       "Step 1 of the method: the pixels whose saliency exceeds gamma times the mean. The image as "
       "in saliency_map().");
+  module.def(
+      "_pixels_address",
+      [](ImageArgument image) {
+        return reinterpret_cast<std::uintptr_t>(to_image(image, "image").data);
+      },
+      py::arg("image"), "Where the library reads an image: within the array, if it is not copied.");
   bind_comparison(module);
 }
 

@@ -64,7 +64,7 @@ void bind_source(py::module_& module) {
       });
   py::class_<SharedSource>(module, "ImageSource",
                            "A sequence of images, read in order: an iterator of Frame.")
-      .def("__iter__", [](const py::object& self) { return self; })
+      .def("__iter__", [](SharedSource& self) -> SharedSource& { return self; })
       .def("__next__", &next_frame)
       .def("skip", &SharedSource::skip, py::call_guard<py::gil_scoped_release>(),
            "Passes over the next frame without decoding it. False at the end.")
