@@ -8,6 +8,7 @@ import os
 import pathlib
 import subprocess
 
+import numpy as np
 import pytest
 
 import loopbit
@@ -57,6 +58,13 @@ def dataset(world, tmp_path_factory):
     folder = tmp_path_factory.mktemp("dataset")
     world.write_dataset(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def run(world, tmp_path_factory):
+    positions = np.array([[*world.pose(frame)[:2], 0.0] for frame in range(len(world))])
+    return loopbit.run_folder(world.source(), tmp_path_factory.mktemp("runs") / "run",
+                              truth=world.truth(), positions_m=positions)
 
 
 def decisions(folder):

@@ -9,13 +9,6 @@ from conftest import as_row, decisions
 import loopbit
 
 
-@pytest.fixture(scope="session")
-def run(world, tmp_path_factory):
-    positions = np.array([[*world.pose(frame)[:2], 0.0] for frame in range(len(world))])
-    return loopbit.run_folder(world.source(), tmp_path_factory.mktemp("runs") / "run",
-                              truth=world.truth(), positions_m=positions)
-
-
 def test_run_folder_is_that_of_the_command(command, dataset, run, tmp_path):
     command("run", dataset / "images", "--out", tmp_path / "cpp", "--truth", dataset / "truth.csv",
             "--not-false", dataset / "not_false.csv", "--poses", dataset / "poses.txt")
