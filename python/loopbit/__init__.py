@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Visual loop closure detection: has the camera been at this place before?
+"""Visual loop closure detection: has the camera been at this place before? ::
 
     import loopbit
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Figures for papers, with matplotlib: vector graphics, told apart by shape and grey level alone.
 
-Each function draws into the given axes, or into a new figure, and returns the axes:
+Each function draws into the given axes, or into a new figure, and returns the axes::
 
     loopbit.plots.trajectory(run).figure.savefig("trajectory.pdf")
 """
