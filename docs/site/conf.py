@@ -3,19 +3,17 @@
 """Sphinx's settings; scripts/docs says where things are."""
 
 import os
+import re
 
 project = "loopbit"
 author = "The loopbit authors"
 copyright = "2026, the loopbit authors"  # noqa: A001: Sphinx's name for it
 version = release = os.environ["LOOPBIT_VERSION"]
-extensions = ["breathe", "myst_parser", "sphinx.ext.autodoc"]
-
-breathe_projects = {"loopbit": os.environ["LOOPBIT_DOXYGEN_XML"]}
-breathe_default_project = "loopbit"
-breathe_show_include = False
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
+autoclass_content = "both"
 
 myst_heading_anchors = 3
 root_doc = "index"
@@ -36,5 +34,10 @@ def escape(app, what, name, obj, options, lines):
     lines[:] = [line.replace("|", r"\|") for line in lines]
 
 
+def without_self(app, what, name, obj, options, signature, returned):
+    return signature and re.sub(r"self(: [\w.]+)?(, )?", "", signature), returned
+
+
 def setup(app):
+    app.connect("autodoc-process-signature", without_self)
     app.connect("autodoc-process-docstring", escape)

@@ -27,28 +27,29 @@ def save(figure, path):
     pyplot.close(figure)
 
 
-def panels(columns, width=9.0):
-    figure, axes = pyplot.subplots(1, columns, figsize=(width, 0.9 * width / columns),
+def panels(rows, columns):
+    """Small in inches, so that letters stay readable on a phone."""
+    figure, axes = pyplot.subplots(rows, columns, figsize=(5.0, 4.4 * rows / columns),
                                    layout="constrained")
-    for each in axes:
+    for each in axes.flat:
         each.set_axis_off()
-    return figure, axes
+    return figure, axes.flat
 
 
 def show(axes, picture, title):
     picture = picture[..., ::-1] if picture.ndim == 3 else picture
     axes.imshow(picture, cmap="gray")
-    axes.set_title(title, fontsize=10)
+    axes.set_title(title, fontsize=9)
 
 
 def draw_content(world, folder):
     """One image on its way to 512 bytes."""
     image = world.render(200)
     content = loopbit.binary_content(image)
-    figure, axes = panels(3)
+    figure, axes = panels(1, 3)
     show(axes[0], image, "image")
-    show(axes[1], loopbit.saliency_map(image), "saliency map S, 64 x 64")
-    show(axes[2], content.bits(), f"binary content O, |O| = {loopbit.count(content)}")
+    show(axes[1], loopbit.saliency_map(image), "saliency map S")
+    show(axes[2], content.bits(), f"content O, |O| = {loopbit.count(content)}")
     save(figure, folder / "content.svg")
 
 
@@ -58,10 +59,10 @@ def draw_candidates(world, run, query, folder):
     index = loopbit.PlaceIndex()
     for frame in range(query - 60):
         index.add(contents[frame])
-    found = index.query(contents[query])[:4]
-    figure, axes = panels(1 + len(found), width=11.0)
+    found = index.query(contents[query])[:3]
+    figure, axes = panels(2, 2)
     show(axes[0], world.render(query), f"query {query}")
-    for each, (place, similarity) in zip(axes[1:], found):
+    for each, (place, similarity) in zip(list(axes)[1:], found):
         show(each, world.render(place), f"place {place}, xi = {similarity:.2f}")
     save(figure, folder / "candidates.svg")
 
@@ -73,14 +74,14 @@ def draw_inliers(world, detection, folder):
     inliers = loopbit.verify(query, place).inliers
     height, width = pair[0].shape[:2]
     scale = width / query.working_size_px[0]
-    figure, axes = pyplot.subplots(figsize=(9.0, 3.6), layout="constrained")
+    figure, axes = pyplot.subplots(figsize=(5.0, 2.2), layout="constrained")
     axes.imshow(np.hstack(pair)[..., ::-1])
     for i, j in inliers:
         a, b = query.keypoints[i], place.keypoints[j]
         axes.plot([a["x_px"] * scale, b["x_px"] * scale + width],
-                  [a["y_px"] * scale, b["y_px"] * scale], color="yellow", linewidth=0.5)
+                  [a["y_px"] * scale, b["y_px"] * scale], color="yellow", linewidth=0.4)
     axes.set_title(f"query {detection.frame} and place {detection.match}: "
-                   f"{len(inliers)} inliers, score {detection.score:g}", fontsize=10)
+                   f"{len(inliers)} inliers, score {detection.score:g}", fontsize=9)
     axes.set_axis_off()
     save(figure, folder / "inliers.svg")
 

@@ -11,6 +11,9 @@
 PYBIND11_MODULE(_loopbit, module) {
   using namespace loopbit::python;
   module.doc() = "The compiled part of loopbit; import loopbit instead.";
+  // What it defines belongs to the package, for who reads a signature or a pickle.
+  const pybind11::object own_name = module.attr("__name__");
+  module.attr("__name__") = "loopbit";
   module.attr("__version__") = loopbit::kVersion;
   // Bad images are reported by loopbit, in its own words.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
@@ -28,4 +31,5 @@ PYBIND11_MODULE(_loopbit, module) {
   bind_world(module);
   bind_run(module);
   bind_report(module);
+  module.attr("__name__") = own_name;
 }
