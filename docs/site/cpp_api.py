@@ -82,16 +82,18 @@ def code(member):
 
 
 def broken(text, width=80):
-    """A long declaration with its parameters one a line."""
+    """A long declaration, with its parameters one a line."""
     if len(text) <= width:
         return text
-    depth, lines = 0, [""]
+    result, depth = "", 0
     for c in text:
-        depth += (c in "(<{") - (c in ")>}")
-        lines[-1] += c
-        if (c == "(" and depth == 1) or (c == "," and depth == 1 and "(" in "".join(lines)):
-            lines.append("    ")
-    return "\n".join(line.rstrip() for line in re.sub(r"\n {4} ", "\n    ", "\n".join(lines)).split("\n"))
+        depth += (c in "({") - (c in ")}")
+        # Within <> commas part other things.
+        depth_of_template = result.count("<") - result.count(">") + result.count("->")
+        result += c
+        if depth == 1 and depth_of_template == 0 and c in "(,":
+            result += "\n   "
+    return result.replace("(\n   ", "(\n    ")
 
 
 def prose(element):

@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include <pybind11/numpy.h>
-#include <pybind11/operators.h>
 #include <pybind11/stl.h>
 
 #include "loopbit/binary_content.hpp"
@@ -115,7 +114,9 @@ void bind_content_type(py::module_& module) {
           },
           "64 words, uint64, read-only, not copied.")
       .def("bits", &bits_of, "The pixels, bool, shape (64, 64): y down, x right.")
-      .def(py::self == py::self)
+      .def(
+          "__eq__", [](const BinaryContent& a, const BinaryContent& b) { return a == b; },
+          py::is_operator())
       .def("__hash__",
            [](const BinaryContent& self) {
              return py::hash(
@@ -158,8 +159,6 @@ void bind_comparison(py::module_& module) {
 
 void bind_content(py::module_& module) {
   bind_content_type(module);
-  bind_settings<BinaryContentOptions>(module, "BinaryContentOptions", "binary_content",
-                                      "Settings of step 1.");
   const auto default_options =
       py::arg_v("options", BinaryContentOptions{}, "BinaryContentOptions()");
   module.def(

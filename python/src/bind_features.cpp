@@ -4,17 +4,16 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include "loopbit/error.hpp"
 #include "loopbit/gray_image.hpp"
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
 
 #include "bindings.hpp"
 #include "numpy_image.hpp"
-#include "settings.hpp"
 
 namespace loopbit::python {
 namespace {
@@ -22,7 +21,6 @@ namespace {
 namespace py = pybind11;
 
 void bind_feature_types(py::module_& module) {
-  bind_settings<SurfOptions>(module, "SurfOptions", "surf", "Settings of the features.");
   py::class_<Features>(module, "Features",
                        "The features of one image; keypoints[i] belongs to descriptors[i].")
       .def_property_readonly(
@@ -68,8 +66,6 @@ void bind_feature_types(py::module_& module) {
 }
 
 void bind_verification(py::module_& module) {
-  bind_settings<VerificationOptions>(module, "VerificationOptions", "verification",
-                                     "Settings of matching and geometry.");
   py::class_<Verification>(module, "Verification",
                            "What the geometry of two images says about them showing one place. "
                            "Matches are structured arrays of query and place, int32: the numbers "

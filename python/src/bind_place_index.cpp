@@ -1,20 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include <mutex>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
-#include "loopbit/error.hpp"
 #include "loopbit/place_index.hpp"
 
 #include "bindings.hpp"
 #include "numpy_image.hpp"
-#include "settings.hpp"
 
 namespace loopbit::python {
 namespace {
@@ -25,7 +22,6 @@ namespace py = pybind11;
 
 void bind_place_index(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(Candidate, place, similarity);
-  bind_settings<RetrievalOptions>(module, "RetrievalOptions", "retrieval", "Settings of step 2.");
   py::class_<PlaceIndex>(
       module, "PlaceIndex",
       "The binary contents of all places, and the question which of them look like a query.")

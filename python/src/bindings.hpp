@@ -9,6 +9,7 @@ namespace loopbit::python {
 // Each adds one group of types and functions to the module, in an order in which a type comes
 // before what uses it.
 void bind_errors(pybind11::module_& module);
+void bind_options(pybind11::module_& module);
 void bind_content(pybind11::module_& module);
 void bind_features(pybind11::module_& module);
 void bind_place_index(pybind11::module_& module);

@@ -22,6 +22,7 @@ PYBIND11_MODULE(_loopbit, module) {
       "active_kernel", [] { return std::string(loopbit::active_kernels().name); },
       "The instruction set whose inner loops run: scalar, avx2 or avx512; LOOPBIT_KERNEL forces "
       "one.");
+  bind_options(module);
   bind_content(module);
   bind_features(module);
   bind_place_index(module);
