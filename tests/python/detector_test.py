@@ -1,6 +1,7 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
 import json
+import pathlib
 import sys
 import threading
 
@@ -9,6 +10,8 @@ import pytest
 from conftest import as_row, decisions
 
 import loopbit
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 
 def test_frame_by_frame_as_the_command(command, dataset, images, tmp_path):
@@ -53,6 +56,12 @@ def test_detection(images):
     assert as_row(detector.query(images[90])) == as_row(detector.query(images[90]))
     assert len(detector) == 90 and repr(detector) == "LoopDetector(90 frames)"
     assert detector.skip().status.name == "unreadable" and len(detector) == 91
+
+
+def test_every_status_is_explained():
+    page = (ROOT / "docs/no_loop.md").read_text()
+    for status in loopbit.Status.__members__:
+        assert status == "loop" or f"\n## `{status}`\n" in page, status
 
 
 def test_evidence(images):
