@@ -19,10 +19,10 @@ namespace py = pybind11;
 
 /// Takes the lock of a detector while the GIL is free.
 struct FreeAndLocked {
-  explicit FreeAndLocked(std::mutex& mutex) : lock(mutex) {}
+  explicit FreeAndLocked(std::recursive_mutex& mutex) : lock(mutex) {}
 
   py::gil_scoped_release release;
-  std::scoped_lock<std::mutex> lock;
+  std::scoped_lock<std::recursive_mutex> lock;
 };
 
 std::string detection_text(const Detection& d) {

@@ -32,7 +32,8 @@ class SharedDetector {
   }
 
  private:
-  mutable std::mutex mutex_;
+  /// A callback in the midst of a run may ask the detector that runs.
+  mutable std::recursive_mutex mutex_;
   LoopDetector detector_;
 };
 

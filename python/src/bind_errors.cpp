@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 #include <exception>
+#include <string>
+#include <utility>
 
 #include "loopbit/error.hpp"
 
@@ -61,7 +63,7 @@ void bind_errors(py::module_& module) {
                 "Something could not be written.")};
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
-      if (thrown) std::rethrow_exception(thrown);
+      if (thrown) std::rethrow_exception(std::move(thrown));
     } catch (const Error& error) {
       PyErr_SetString(type_of(error.kind()), error.what());
     }

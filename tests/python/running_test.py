@@ -53,6 +53,14 @@ def test_callbacks(dataset, images, tmp_path):
         loopbit.run(folder)
 
 
+def test_a_callback_may_ask_the_detector_that_runs(world, images):
+    detector = loopbit.LoopDetector()
+    asked = []
+    loopbit.run(loopbit.World(world.options).source(), detector,
+                on_detection=lambda d: asked.append(detector.query(images[d.frame]).frame))
+    assert asked == list(range(1, 121))
+
+
 @pytest.mark.parametrize("error, stopped_by", [(RuntimeError("enough"), "enough"),
                                                (KeyboardInterrupt(), "interrupt")])
 def test_a_run_that_is_stopped_keeps_what_it_found(tmp_path, dataset, error, stopped_by):
