@@ -137,14 +137,12 @@ void bind_poses(py::module_& module) {
       "read_positions",
       [](const Path& path, const Times& times_s) {
         const auto poses = poses_of_frames(read_poses(path.string()), times_s);
-        py::array_t<double> positions({static_cast<py::ssize_t>(poses.size()), py::ssize_t{3}});
-        for (std::size_t row = 0; row < poses.size(); ++row) {
-          for (int axis = 0; axis < 3; ++axis) {
-            positions.mutable_at(row, axis) =
-                poses[row] ? poses[row]->position_m[axis] : std::nan("");
-          }
+        std::vector<std::optional<cv::Vec3d>> positions_m;
+        positions_m.reserve(poses.size());
+        for (const auto& pose : poses) {
+          positions_m.push_back(pose ? std::optional(pose->position_m) : std::nullopt);
         }
-        return positions;
+        return to_array(positions_m);
       },
       py::arg("path"), py::arg("times_s"),
       "Camera centres by KITTI poses or a TUM trajectory, shape (n, 3), nan where not known; one a "

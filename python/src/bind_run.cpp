@@ -23,6 +23,7 @@
 #include "bind_data.hpp"
 #include "bind_detector.hpp"
 #include "bindings.hpp"
+#include "numpy_image.hpp"
 #include "settings.hpp"
 
 namespace loopbit::python {
@@ -136,17 +137,6 @@ class RecordedRun {
   RunRecord record_;
 };
 
-py::array_t<double> positions_of(const FinishedRun& run) {
-  py::array_t<double> positions({static_cast<py::ssize_t>(run.positions_m.size()), py::ssize_t{3}});
-  for (std::size_t row = 0; row < run.positions_m.size(); ++row) {
-    for (int axis = 0; axis < 3; ++axis) {
-      positions.mutable_at(row, axis) =
-          run.positions_m[row] ? (*run.positions_m[row])[axis] : std::nan("");
-    }
-  }
-  return positions;
-}
-
 std::map<PlaceId, BinaryContent> contents_of(const FinishedRun& run) {
   std::map<PlaceId, BinaryContent> contents;
   if (run.evidence_path.empty()) return contents;
@@ -164,9 +154,10 @@ void bind_finished_run(py::module_& module) {
       .def_readonly("truth", &FinishedRun::truth, "As it was given to the run, or None.")
       .def_readonly("record_json", &FinishedRun::record_json,
                     "run.json; empty if the run did not end in order.")
-      .def_property_readonly("positions_m", &positions_of,
-                             "Camera centres, shape (n, 3), nan where not known; n is 0 where the "
-                             "run had no poses.")
+      .def_property_readonly(
+          "positions_m", [](const FinishedRun& self) { return to_array(self.positions_m); },
+          "Camera centres, shape (n, 3), nan where not known; n is 0 where the "
+          "run had no poses.")
       .def("contents", &contents_of,
            "The binary content of each readable frame, by its number; none without evidence.")
       .def("__repr__", [](const FinishedRun& self) {

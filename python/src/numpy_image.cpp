@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "numpy_image.hpp"
 
+#include <cmath>
 #include <string>
 
 #include <fmt/format.h>
@@ -88,6 +89,15 @@ py::object to_array(const cv::Mat& image) {
   const py::capsule owner(new cv::Mat(image),
                           [](void* pointer) { delete static_cast<cv::Mat*>(pointer); });
   return py::array(py::dtype(type), shape, strides, image.data, owner);
+}
+
+py::array_t<double> to_array(const std::vector<std::optional<cv::Vec3d>>& positions_m) {
+  py::array_t<double> rows({static_cast<py::ssize_t>(positions_m.size()), py::ssize_t{3}});
+  double* next = rows.mutable_data();
+  for (const auto& position_m : positions_m) {
+    for (int axis = 0; axis < 3; ++axis) *next++ = position_m ? (*position_m)[axis] : std::nan("");
+  }
+  return rows;
 }
 
 }  // namespace loopbit::python

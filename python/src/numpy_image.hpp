@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -24,6 +25,9 @@ cv::Mat to_image(ImageArgument& argument, const char* name);
 
 /// The same memory as an array: nothing is copied, and `image` is kept alive by it. None if empty.
 pybind11::object to_array(const cv::Mat& image);
+
+/// Shape (n, 3), nan where there is none.
+pybind11::array_t<double> to_array(const std::vector<std::optional<cv::Vec3d>>& positions_m);
 
 /// An array over memory that `owner` keeps alive, without a copy.
 template <typename Value>
