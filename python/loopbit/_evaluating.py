@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Sequence
 from typing import Union
@@ -87,37 +88,42 @@ def evaluate(
 
     found: a run, a list of matches, detections, or the path of a run folder or of a CSV of
     query,match[,score]. truth: as read_truth() gives it, or its path; a run that was given a truth
-    needs none. A protocol fixes the tolerance, which then must not be given.
+    needs none, and is scored as it was then. A protocol fixes the tolerance, which then must not be
+    given.
     """
-    matches, own_truth = _found(found)
+    if isinstance(found, (str, os.PathLike)) and os.path.isdir(found):
+        found = _loopbit.read_run(found)
     if protocol and tolerance_frames is not None:
         raise _loopbit.OptionError(
             f"tolerance_frames cannot be given with protocol '{protocol}', which fixes it; leave "
             "out one of them."
         )
-    if truth is None:
-        truth = own_truth
-    if truth is None:
-        raise _loopbit.OptionError("Nothing says what is true; give truth.")
-    if not isinstance(truth, GroundTruth):
-        truth = read_truth(truth, protocol=protocol, times_s=matches.times_s)
     tolerance = tolerance_frames or 0
     if protocol:
         tolerance = _loopbit.find_protocol(protocol).tolerance_frames
+    if isinstance(found, FinishedRun) and truth is None:
+        truth = found.truth
+        if not protocol and tolerance_frames is None:
+            tolerance, protocol = recorded_scoring(found)
+    if truth is None:
+        raise _loopbit.OptionError("Nothing says what is true; give truth.")
     if tolerance < 0:
         raise _loopbit.OptionError(f"tolerance_frames is {tolerance}, but must be 0 or more.")
+    matches = _matches(found)
+    if not isinstance(truth, GroundTruth):
+        truth = read_truth(truth, protocol=protocol, times_s=matches.times_s)
     return _loopbit._evaluate(matches, truth, tolerance, protocol)
 
 
-def _found(
-    found: FinishedRun | MatchList | Sequence[Detection] | Path,
-) -> tuple[MatchList, GroundTruth | None]:
+def recorded_scoring(run: FinishedRun) -> tuple[int, str]:
+    """The tolerance and the protocol that the run was scored with when it ended."""
+    score = json.loads(run.record_json or "{}").get("score", {})
+    return score.get("tolerance_frames", 0), score.get("protocol") or ""
+
+
+def _matches(found: FinishedRun | MatchList | Sequence[Detection] | Path) -> MatchList:
     if isinstance(found, (str, os.PathLike)):
-        if not os.path.isdir(found):
-            return _loopbit.read_match_list(found), None
-        found = _loopbit.read_run(found)
+        return _loopbit.read_match_list(found)
     if isinstance(found, FinishedRun):
-        return _loopbit.match_list(found.detections), found.truth
-    if isinstance(found, MatchList):
-        return found, None
-    return _loopbit.match_list(list(found)), None
+        return _loopbit.match_list(found.detections)
+    return found if isinstance(found, MatchList) else _loopbit.match_list(list(found))

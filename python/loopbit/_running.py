@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import warnings
 from collections.abc import Callable, Iterable
@@ -14,7 +13,7 @@ import numpy
 import numpy.typing
 
 from loopbit import _loopbit
-from loopbit._evaluating import Path, read_truth
+from loopbit._evaluating import Path, read_truth, recorded_scoring
 from loopbit._loopbit import (
     Detection,
     FinishedRun,
@@ -141,13 +140,6 @@ def write_report(run: FinishedRun | Path, path: Path | None = None) -> str:
     if not isinstance(run, FinishedRun):
         run = _loopbit.read_run(run)
     path = os.path.join(run.path, "report.html") if path is None else os.fspath(path)
-    record = json.loads(run.record_json) if run.record_json else {}
-    score = record.get("score", {})
-    _loopbit._write_report(
-        run,
-        os.path.basename(os.path.normpath(run.path)),
-        path,
-        score.get("tolerance_frames", 0),
-        score.get("protocol") or "",
-    )
+    name = os.path.basename(os.path.normpath(run.path))
+    _loopbit._write_report(run, name, path, *recorded_scoring(run))
     return path

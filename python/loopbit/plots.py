@@ -18,6 +18,7 @@ from matplotlib import pyplot  # type: ignore[import]
 from matplotlib.axes import Axes  # type: ignore[import]
 
 from loopbit import _loopbit
+from loopbit._evaluating import evaluate
 from loopbit._loopbit import BinaryContent, Detection, Evaluation, FinishedRun
 from loopbit._running import detections_array
 
@@ -48,7 +49,7 @@ def trajectory(run: FinishedRun, axes: Axes | None = None) -> Axes:
     axes = _axes(axes)
     axes.plot(*at.T, color="0.0", linewidth=0.8, label="path", zorder=2)
     loops = _loops(run)
-    score = _evaluation(run)
+    score = None if run.truth is None else evaluate(run)
     wrong = set() if score is None else {int(query) for query in score.wrong_loops["query"]}
     for is_wrong, style in ((False, {"color": "0.6", "linewidth": 0.6}),
                             (True, {"color": "0.0", "linewidth": 2.0, "linestyle": "--"})):
@@ -68,12 +69,6 @@ def trajectory(run: FinishedRun, axes: Axes | None = None) -> Axes:
 
 def _loops(run: FinishedRun) -> list[tuple[int, int]]:
     return [(d.frame, d.match) for d in run.detections if d.is_loop and d.match is not None]
-
-
-def _evaluation(run: FinishedRun) -> Evaluation | None:
-    if run.truth is None:
-        return None
-    return _loopbit._evaluate(_loopbit.match_list(run.detections), run.truth, 0, "")
 
 
 def precision_recall(

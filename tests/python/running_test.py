@@ -106,6 +106,19 @@ def test_score_is_that_of_the_command(command, run, dataset):
             assert json.loads(loopbit.evaluate(found, **arguments).to_json()) == expected
 
 
+def test_a_run_is_scored_again_as_it_was(command, dataset, world, tmp_path):
+    matrix = np.zeros((len(world), len(world)), int)
+    for query, first, last in world.truth().same_place.tolist():
+        matrix[query, first:last + 1] = 1
+    np.savetxt(tmp_path / "matrix.txt", matrix, fmt="%d")
+    run = loopbit.run_folder(dataset / "images", tmp_path / "run", evidence=False,
+                             truth=tmp_path / "matrix.txt", protocol="ibow-lcd")
+    score = loopbit.evaluate(run)
+    assert (score.protocol, score.tolerance_frames) == ("ibow-lcd", 40)
+    assert json.loads(score.to_json()) == json.loads(command("eval", run.path, "--json"))
+    assert loopbit.evaluate(run, tolerance_frames=0).protocol == ""
+
+
 def test_evaluation_of_arrays():
     truth = loopbit.GroundTruth([[10, 0, 2], [11, 1, 3], [12, 2, 4]], [[13, 5]], [14])
     found = loopbit.MatchList(query=[10, 11, 12, 13, 14], match=[1, 2, 9, 5, 0],
