@@ -98,7 +98,7 @@ def precision_recall(
 def times(
     detections: FinishedRun | Sequence[Detection], axes: Axes | None = None, *, bins: int = 100
 ) -> Axes:
-    """Milliseconds a frame by step, stacked; the mean of equally many frames in each of the bins."""
+    """Milliseconds a frame by step, stacked; each bin is the mean of equally many frames."""
     if isinstance(detections, FinishedRun):
         detections = detections.detections
     table = detections_array(detections)
@@ -121,8 +121,9 @@ def similarity(
     contents: FinishedRun | Sequence[BinaryContent] | numpy.typing.NDArray[Any],
     axes: Axes | None = None,
 ) -> Axes:
-    """The matrix of similarities xi, dark where alike: of a run's frames, with its loops as circles,
-    of contents, or as similarity_matrix() gives it. xi is the best over the tolerated shifts."""
+    """The matrix of similarities xi, dark where alike: of a run's frames, with its loops as
+    circles, of contents, or as similarity_matrix() gives it. xi is the best over the shifts that
+    retrieval tolerates by default."""
     axes = _axes(axes)
     frames = None
     if isinstance(contents, FinishedRun):
