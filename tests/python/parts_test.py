@@ -152,7 +152,7 @@ def test_matches(images):
     assert np.array_equal(found.matches, loopbit.match_features(a, b, ratio))
     assert found.matches.dtype.names == ("query", "place")
     assert set(found.inliers.tolist()) <= set(found.matches.tolist())
-    assert 8 <= found.distinct_inliers <= len(found.inliers)
+    assert 0 < found.distinct_inliers <= len(found.inliers)
     for end, features in (("query", a), ("place", b)):
         assert len(set(found.matches[end])) == len(found.matches)
         assert found.matches[end].max() < len(features)
