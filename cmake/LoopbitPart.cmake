@@ -14,6 +14,20 @@ function(loopbit_part name)
     PUBLIC ${PART_LINKS}
     PRIVATE ${PART_PRIVATE_LINKS} loopbit_warnings)
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  loopbit_export_only_public(${target} "${PART_HEADERS}")
   list(TRANSFORM PART_HEADERS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/include/loopbit/)
-  install(FILES ${PART_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbit)
+  install(FILES ${PART_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbit COMPONENT dev)
+endfunction()
+
+# Symbols are hidden in a shared library, but for what the public headers declare: each source reads
+# these first, with another visibility, so that no header needs a mark of its own.
+function(loopbit_export_only_public target headers)
+  list(TRANSFORM headers REPLACE "(.+)" "#include \"loopbit/\\1\"")
+  list(JOIN headers "\n" includes)
+  set(public ${CMAKE_CURRENT_BINARY_DIR}/public.hpp)
+  file(CONFIGURE OUTPUT ${public} @ONLY
+       CONTENT "#pragma GCC visibility push(default)\n@includes@\n#pragma GCC visibility pop\n")
+  target_compile_options(${target} PRIVATE -include ${public})
+  set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden
+                                             VISIBILITY_INLINES_HIDDEN ON)
 endfunction()

@@ -7,6 +7,7 @@
 
 Every fenced block of the file README is tried, in order, in the folder SCRATCH/work:
   sh     is run by bash, with the loopbit installed in PREFIX first in PATH;
+  python is a whole script, run with the Python module in PREFIX;
   cpp    is a whole program: built against PREFIX with the consumer's CMakeLists.txt;
   cmake  is a whole CMakeLists.txt: builds the C++ program shown last;
   text   shows output or a sketch and is not run.
@@ -84,6 +85,11 @@ class Runner:
         environment = {**os.environ, "PATH": path}
         run(["bash", "-euo", "pipefail", "-c", text], cwd=self.work, env=environment)
 
+    def python(self, text):
+        environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1",
+                       "PYTHONPATH": str(self.prefix / "lib/python3/dist-packages")}
+        run(["/usr/bin/python3", "-c", text], cwd=self.work, env=environment)
+
     def cpp(self, text):
         if "int main" not in text:
             raise BlockError("not a whole program")
@@ -113,7 +119,8 @@ def main():
         sys.exit(__doc__)
     readme, prefix, scratch = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
     runner = Runner(prefix, scratch)
-    actions = {"sh": runner.sh, "cpp": runner.cpp, "cmake": runner.cmake, "text": runner.text}
+    actions = {"sh": runner.sh, "python": runner.python, "cpp": runner.cpp, "cmake": runner.cmake,
+               "text": runner.text}
     number = 0
     try:
         for block in blocks_of(readme.read_text(encoding="utf-8")):

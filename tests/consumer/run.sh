@@ -1,7 +1,9 @@
 #!/usr/bin/env bash
-# Proves the package from outside: installs a build, then builds and runs a program against it.
+# Proves the package from outside: installs a build, then builds and runs a program against it, by
+# find_package and by pkg-config.
 #
 #   run.sh BUILD_DIR SCRATCH    leaves the installed package in SCRATCH/prefix
+#   run.sh --installed SCRATCH  takes what the system has installed
 set -euo pipefail
 
 build=$1
@@ -10,11 +12,28 @@ source=$(dirname "$(readlink -f "$0")")
 
 rm -rf "$scratch"
 mkdir -p "$scratch"
-cmake --install "$build" --prefix "$scratch/prefix" >"$scratch/install.log"
-cmake -S "$source" -B "$scratch/build" -G Ninja -DCMAKE_PREFIX_PATH="$scratch/prefix"
+if [[ $build == --installed ]]; then
+  prefix=/usr
+else
+  prefix=$scratch/prefix
+  cmake --install "$build" --prefix "$prefix" >"$scratch/install.log"
+  export PKG_CONFIG_PATH=$prefix/lib/pkgconfig
+fi
+cmake -S "$source" -B "$scratch/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix"
 cmake --build "$scratch/build"
+
+read -ra flags < <(pkg-config --cflags --libs "$([[ -e $prefix/lib/libloopbit.a ]] && echo --static ||
+  echo --shared)" loopbit)
+g++ -std=c++20 "$source/main.cpp" "${flags[@]}" -lopencv_imgcodecs -o "$scratch/by_pkg_config"
+
+if grep -rE -e '-m(avx|sse|arch|tune)' "$prefix"/lib/{,*/}{cmake/loopbit,pkgconfig/loopbit*} 2>/dev/null; then
+  echo "run.sh: instruction-set flags reach whoever links loopbit." >&2
+  exit 1
+fi
 
 for image in first second; do
   { printf 'P5\n320 240\n255\n' && head -c 76800 <(seq 100000); } >"$scratch/$image.pgm"
 done
-"$scratch/build/consumer" "$scratch/first.pgm" "$scratch/second.pgm"
+for program in build/consumer by_pkg_config; do
+  "$scratch/$program" "$scratch/first.pgm" "$scratch/second.pgm"
+done

@@ -1,0 +1,66 @@
+# The Debian packages that `cpack -G DEB` makes of a build with shared libraries; see scripts/packages.
+set(CPACK_GENERATOR DEB)
+set(CPACK_PACKAGE_CONTACT "The loopbit authors <authors@loopbit.invalid>")
+set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_STRIP_FILES ON)
+set(CPACK_COMPONENTS_ALL lib data dev tools python)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
+set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
+# Other libraries by what is linked; ours, which no package is installed of yet, by name below.
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${PROJECT_BINARY_DIR}/src ${PROJECT_BINARY_DIR}/src/report)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)
+set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS_POLICY "=")
+
+set(abi ${PROJECT_VERSION_MAJOR}.${PROJECT_VERSION_MINOR})
+set(this "(= ${PROJECT_VERSION})")
+set(summary "visual loop closure detection via binary content")
+
+set(CPACK_DEBIAN_LIB_PACKAGE_NAME libloopbit${abi})
+set(CPACK_DEBIAN_LIB_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_LIB_DESCRIPTION "${summary}: the detector
+ Tells a robot, image by image, whether it has been here before.")
+
+set(CPACK_DEBIAN_DATA_PACKAGE_NAME libloopbit-data${abi})
+set(CPACK_DEBIAN_DATA_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS "libloopbit${abi} ${this}")
+set(CPACK_DEBIAN_DATA_DESCRIPTION "${summary}: data sets, scores, reports
+ Reads image sequences and ground truth, scores loops, and writes reports.")
+
+set(CPACK_DEBIAN_DEV_PACKAGE_NAME libloopbit-dev)
+set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
+    "libloopbit${abi} ${this}, libloopbit-data${abi} ${this}, libopencv-dev")
+set(CPACK_DEBIAN_DEV_DESCRIPTION "${summary}: headers
+ For programs that use loopbit, with CMake or pkg-config.")
+
+set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME loopbit)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "libloopbit${abi} ${this}, libloopbit-data${abi} ${this}")
+set(CPACK_DEBIAN_TOOLS_DESCRIPTION "${summary}: the command
+ Finds loops in image sequences, scores and shows them.")
+
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-loopbit)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+if(LOOPBIT_BUILD_PYTHON)
+  math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
+  string(CONCAT CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+         "libloopbit${abi} ${this}, libloopbit-data${abi} ${this}, python3-numpy, "
+         "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_minor})")
+endif()
+set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS python3-matplotlib)
+set(CPACK_DEBIAN_PYTHON_DESCRIPTION "${summary}: Python module
+ Images are numpy arrays, results are typed objects and structured arrays.")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/postinst
+                                              ${PROJECT_SOURCE_DIR}/cmake/debian/prerm)
+
+foreach(component ${CPACK_COMPONENTS_ALL})
+  string(TOUPPER ${component} upper)
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE
+          DESTINATION share/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME}
+          RENAME copyright
+          COMPONENT ${component}
+          EXCLUDE_FROM_ALL)
+endforeach()
+include(CPack)

@@ -1,0 +1,110 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""Draws the documentation's pictures, with loopbit and its built-in world:
+
+    make_pictures.py FOLDER
+"""
+
+import pathlib
+import sys
+import tempfile
+
+import matplotlib
+
+matplotlib.use("agg")
+
+import loopbit
+import loopbit.plots
+import numpy as np
+from matplotlib import pyplot
+
+matplotlib.rcParams["svg.hashsalt"] = "loopbit"  # the same picture is the same file
+WORLD = loopbit.WorldOptions(frames=240, spacing_m=1.5, width_px=320, height_px=240)
+
+
+def save(figure, path):
+    figure.savefig(path, metadata={"Date": None})
+    pyplot.close(figure)
+
+
+def panels(rows, columns):
+    """Small in inches, so that letters stay readable on a phone."""
+    figure, axes = pyplot.subplots(rows, columns, figsize=(5.0, 4.4 * rows / columns),
+                                   layout="constrained")
+    for each in axes.flat:
+        each.set_axis_off()
+    return figure, axes.flat
+
+
+def show(axes, picture, title):
+    picture = picture[..., ::-1] if picture.ndim == 3 else picture
+    axes.imshow(picture, cmap="gray")
+    axes.set_title(title, fontsize=9)
+
+
+def draw_content(world, folder):
+    """One image on its way to 512 bytes."""
+    image = world.render(200)
+    content = loopbit.binary_content(image)
+    figure, axes = panels(1, 3)
+    show(axes[0], image, "image")
+    show(axes[1], loopbit.saliency_map(image), "saliency map S")
+    show(axes[2], content.bits(), f"content O, |O| = {loopbit.count(content)}")
+    save(figure, folder / "content.svg")
+
+
+def draw_candidates(world, run, query, folder):
+    """What retrieval answers for one frame."""
+    contents = run.contents()
+    index = loopbit.PlaceIndex()
+    for frame in range(query - 60):
+        index.add(contents[frame])
+    found = index.query(contents[query])[:3]
+    figure, axes = panels(2, 2)
+    show(axes[0], world.render(query), f"query {query}")
+    for each, (place, similarity) in zip(list(axes)[1:], found):
+        show(each, world.render(place), f"place {place}, xi = {similarity:.2f}")
+    save(figure, folder / "candidates.svg")
+
+
+def draw_inliers(world, detection, folder):
+    """The matches that one epipolar geometry explains."""
+    pair = [world.render(frame) for frame in (detection.frame, detection.match)]
+    query, place = map(loopbit.extract_surf, pair)
+    inliers = loopbit.verify(query, place).inliers
+    height, width = pair[0].shape[:2]
+    scale = width / query.working_size_px[0]
+    figure, axes = pyplot.subplots(figsize=(5.0, 2.2), layout="constrained")
+    axes.imshow(np.hstack(pair)[..., ::-1])
+    for i, j in inliers[::4]:
+        a, b = query.keypoints[i], place.keypoints[j]
+        axes.plot([a["x_px"] * scale, b["x_px"] * scale + width],
+                  [a["y_px"] * scale, b["y_px"] * scale], color="yellow", linewidth=0.4)
+    axes.set_title(f"query {detection.frame} and place {detection.match}: "
+                   f"{len(inliers)} inliers, every fourth drawn", fontsize=9)
+    axes.set_axis_off()
+    save(figure, folder / "inliers.svg")
+
+
+def main():
+    folder = pathlib.Path(sys.argv[1])
+    folder.mkdir(parents=True, exist_ok=True)
+    world = loopbit.World(WORLD)
+    positions = [[*world.pose(frame)[:2], 0.0] for frame in range(len(world))]
+    with tempfile.TemporaryDirectory(prefix="loopbit_pictures_") as scratch:
+        run = loopbit.run_folder(world.source(), pathlib.Path(scratch) / "run",
+                                 truth=world.truth(), positions_m=positions)
+        draw_content(world, folder)
+        loop = max((d for d in run.detections if d.is_loop), key=lambda d: d.score)
+        draw_candidates(world, run, loop.frame, folder)
+        draw_inliers(world, loop, folder)
+        plots = {"trajectory": loopbit.plots.trajectory(run),
+                 "similarity": loopbit.plots.similarity(run),
+                 "precision_recall": loopbit.plots.precision_recall(loopbit.evaluate(run)),
+                 "times": loopbit.plots.times(run)}
+        for name, axes in plots.items():
+            save(axes.figure, folder / f"{name}.svg")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+//
+// Loop closure beside a keyframe SLAM: the tracker hands over its keyframes and goes on; a thread
+// of its own finds the loops and hands them to the back end. Here the "tracker" takes every third
+// image of a sequence as a keyframe, and the "back end" prints the edge it would add to its pose
+// graph.
+//
+//   keyframe_slam INPUT    INPUT as in `loopbit run`
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <iostream>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <loopbit/error.hpp>
+#include <loopbit/image_source.hpp>
+#include <loopbit/loop_detector.hpp>
+#include <opencv2/core.hpp>
+
+namespace {
+
+using KeyframeId = int;
+
+struct Keyframe {
+  KeyframeId id = 0;
+  cv::Mat image;
+};
+
+/// Finds loops among keyframes, in the order in which they are added, without holding up whoever
+/// adds them. `on_loop(query, match, score)` is called from its thread.
+class LoopCloser {
+ public:
+  using OnLoop = std::function<void(KeyframeId, KeyframeId, double)>;
+
+  explicit LoopCloser(OnLoop on_loop) : on_loop_(std::move(on_loop)), thread_([this] { work(); }) {}
+
+  /// Finishes what was added.
+  ~LoopCloser() {
+    {
+      const std::scoped_lock lock(mutex_);
+      is_done_ = true;
+    }
+    changed_.notify_one();
+    thread_.join();
+  }
+  LoopCloser(const LoopCloser&) = delete;
+  LoopCloser& operator=(const LoopCloser&) = delete;
+  LoopCloser(LoopCloser&&) = delete;
+  LoopCloser& operator=(LoopCloser&&) = delete;
+
+  void add(Keyframe keyframe) {
+    {
+      const std::scoped_lock lock(mutex_);
+      waiting_.push_back(std::move(keyframe));
+    }
+    changed_.notify_one();
+  }
+
+ private:
+  void work() {
+    for (std::unique_lock lock(mutex_);;) {
+      changed_.wait(lock, [this] { return is_done_ || !waiting_.empty(); });
+      if (waiting_.empty()) return;
+      const Keyframe keyframe = std::move(waiting_.front());
+      waiting_.pop_front();
+      lock.unlock();
+      detect(keyframe);
+      lock.lock();
+    }
+  }
+
+  void detect(const Keyframe& keyframe) {
+    const loopbit::Detection found = detector_.process(keyframe.image);
+    // loopbit numbers places 0, 1, 2, ...; the back end has names of its own for them.
+    ids_.push_back(keyframe.id);
+    if (found.status == loopbit::Status::loop) {
+      on_loop_(keyframe.id, ids_[static_cast<std::size_t>(*found.match)], found.score);
+    }
+  }
+
+  OnLoop on_loop_;
+  loopbit::LoopDetector detector_;
+  std::vector<KeyframeId> ids_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Keyframe> waiting_;
+  bool is_done_ = false;
+  std::thread thread_;
+};
+
+void run(const char* input) {
+  constexpr KeyframeId kEvery = 3;
+  LoopCloser closer([](KeyframeId query, KeyframeId match, double score) {
+    std::cout << "edge " << query << " -> " << match << ", score " << score << '\n';
+  });
+  const auto source = loopbit::open_source(input);
+  KeyframeId id = 0;
+  for (loopbit::Frame frame; source->next(frame); ++id) {
+    if (id % kEvery == 0 && !frame.image.empty()) closer.add({id, frame.image});
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 2) {
+    std::cerr << "usage: keyframe_slam INPUT\n";
+    return 2;
+  }
+  try {
+    run(argv[1]);
+  } catch (const loopbit::Error& error) {
+    std::cerr << error.what() << '\n';
+    return 1;
+  }
+}

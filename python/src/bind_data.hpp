@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "loopbit/image_source.hpp"
+
+namespace loopbit::python {
+
+/// An ImageSource that several Python threads may hold: one at a time reads, without the GIL.
+class SharedSource : public ImageSource {
+ public:
+  /// `input`, `every` and `limit`: how it was opened, for run.json.
+  explicit SharedSource(std::unique_ptr<ImageSource> source, std::string input, int every = 1,
+                        int limit = 0)
+      : input_(std::move(input)), every_(every), limit_(limit), source_(std::move(source)) {}
+
+  // These must be called without the GIL: see SharedDetector.
+  bool next(Frame& frame) override {
+    const std::scoped_lock lock(mutex_);
+    return source_->next(frame);
+  }
+  bool skip() override {
+    const std::scoped_lock lock(mutex_);
+    return source_->skip();
+  }
+
+  [[nodiscard]] std::optional<std::size_t> size() const override { return source_->size(); }
+  [[nodiscard]] std::string description() const override { return source_->description(); }
+  [[nodiscard]] const std::string& input() const { return input_; }
+  [[nodiscard]] int every() const { return every_; }
+  [[nodiscard]] int limit() const { return limit_; }
+
+ private:
+  std::string input_;
+  int every_;
+  int limit_;
+  std::mutex mutex_;
+  std::unique_ptr<ImageSource> source_;
+};
+
+}  // namespace loopbit::python

@@ -1,0 +1,161 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "bind_detector.hpp"
+
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+
+#include "bindings.hpp"
+#include "numpy_image.hpp"
+
+namespace loopbit::python {
+namespace {
+
+namespace py = pybind11;
+
+/// Takes the lock of a detector while the GIL is free.
+struct FreeAndLocked {
+  explicit FreeAndLocked(std::recursive_mutex& mutex) : lock(mutex) {}
+
+  py::gil_scoped_release release;
+  std::scoped_lock<std::recursive_mutex> lock;
+};
+
+std::string detection_text(const Detection& d) {
+  std::string text = fmt::format("Detection(frame={}, status={}", d.frame, to_string(d.status));
+  if (d.match) text += fmt::format(", match={}, score={:.1f}", *d.match, d.score);
+  if (d.match) text += fmt::format(", similarity={:.3f}, inliers={}", d.similarity, d.inliers);
+  return text + ")";
+}
+
+void bind_detection(py::module_& module) {
+  py::enum_<Status> status(module, "Status", "Why a frame is a loop, or why not.");
+  for (const Status each : kAllStatuses) status.value(to_string(each).data(), each);
+  py::class_<StepTimes>(module, "StepTimes", "Wall time of the steps of one detection.")
+      .def_readonly("content_ms", &StepTimes::content_ms,
+                    "Binary content, with conversion to grey.")
+      .def_readonly("retrieval_ms", &StepTimes::retrieval_ms, "Fast image retrieval.")
+      .def_readonly("features_ms", &StepTimes::features_ms, "SURF.")
+      .def_readonly("verification_ms", &StepTimes::verification_ms,
+                    "Matching, geometry and decision.")
+      .def("__repr__", [](const StepTimes& t) {
+        return fmt::format(
+            "StepTimes(content_ms={:.3f}, retrieval_ms={:.3f}, features_ms={:.3f}, "
+            "verification_ms={:.3f})",
+            t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
+      });
+  py::class_<Detection>(module, "Detection",
+                        "The answer for one frame, with the numbers behind it.")
+      .def_readonly("frame", &Detection::frame, "The frame's number, from 0.")
+      .def_readonly("timestamp_s", &Detection::timestamp_s, "As it was given.")
+      .def_readonly("status", &Detection::status, "Why it is a loop, or why not.")
+      .def_readonly("match", &Detection::match, "The best candidate, accepted or not, or None.")
+      .def_readonly("score", &Detection::score, "What was compared with decision.min_score.")
+      .def_readonly("similarity", &Detection::similarity, "xi of frame and match.")
+      .def_readonly("matches", &Detection::matches, "Features shared, one to one.")
+      .def_readonly("inliers", &Detection::inliers, "Those that one epipolar geometry explains.")
+      .def_readonly("times", &Detection::times, "The time of each step.")
+      .def_property_readonly(
+          "is_loop", [](const Detection& self) { return self.status == Status::loop; },
+          "Whether the match is accepted.")
+      .def("__repr__", &detection_text);
+}
+
+/// A row of Evidence.inliers.
+struct PointPairRow {
+  float query_x, query_y, match_x, match_y;
+};
+
+void bind_evidence(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(PointPairRow, query_x, query_y, match_x, match_y);
+  py::class_<Evidence>(module, "Evidence",
+                       "What a detection rests on, for people to look at; process() fills it.")
+      .def(py::init<>())
+      .def_readonly("content", &Evidence::content, "The frame's binary content.")
+      .def_property_readonly(
+          "saliency", [](const Evidence& self) { return to_array(self.saliency); },
+          "The frame's saliency map, float32, shape (64, 64); None before process().")
+      .def_property_readonly(
+          "inliers",
+          [](const Evidence& self) {
+            std::vector<PointPairRow> rows;
+            rows.reserve(self.inliers.size());
+            for (const auto& [query, match] : self.inliers) {
+              rows.push_back({query.x, query.y, match.x, match.y});
+            }
+            return take(std::move(rows));
+          },
+          "Structured array of query_x, query_y, match_x and match_y, float32, each 0 to 1 of the "
+          "image's width or height.")
+      .def("__repr__", [](const Evidence& self) {
+        return fmt::format("Evidence(inliers={})", self.inliers.size());
+      });
+}
+
+}  // namespace
+
+Detection SharedDetector::process(ImageArgument image, std::optional<double> timestamp_s,
+                                  Evidence* evidence) {
+  const cv::Mat pixels = to_image(image, "image");
+  Detection detection;
+  Evidence seen;
+  {
+    const FreeAndLocked guard(mutex_);
+    detection = detector_.process(pixels, timestamp_s, evidence ? &seen : nullptr);
+  }
+  // With the GIL, for others may be reading it.
+  if (evidence) *evidence = std::move(seen);
+  return detection;
+}
+
+Detection SharedDetector::query(ImageArgument image, std::optional<double> timestamp_s) const {
+  const cv::Mat pixels = to_image(image, "image");
+  const FreeAndLocked guard(mutex_);
+  return detector_.query(pixels, timestamp_s);
+}
+
+Detection SharedDetector::skip(std::optional<double> timestamp_s) {
+  const FreeAndLocked guard(mutex_);
+  return detector_.skip(timestamp_s);
+}
+
+PlaceId SharedDetector::size() const {
+  const FreeAndLocked guard(mutex_);
+  return detector_.size();
+}
+
+LoopDetectorOptions SharedDetector::options() const {
+  const FreeAndLocked guard(mutex_);
+  return detector_.options();
+}
+
+void bind_detector(py::module_& module) {
+  bind_detection(module);
+  bind_evidence(module);
+  py::class_<SharedDetector>(
+      module, "LoopDetector",
+      "Tells for each camera image whether the camera has been at this place before. Several "
+      "threads may share one; it works for one at a time, without the GIL.")
+      .def(py::init<const LoopDetectorOptions&>(),
+           py::arg_v("options", LoopDetectorOptions{}, "LoopDetectorOptions()"))
+      .def("process", &SharedDetector::process, py::arg("image"),
+           py::arg("timestamp_s") = py::none(), py::arg("evidence") = py::none(),
+           "Detects, then adds the image as the next place. The image: uint8 or uint16, (h, w), or "
+           "BGR or BGRA, at least 32 x 32; not copied where its rows are contiguous. The time: not "
+           "before the last one. The evidence, if given, is filled.")
+      .def("query", &SharedDetector::query, py::arg("image"), py::arg("timestamp_s") = py::none(),
+           "What process() would answer now, without adding anything.")
+      .def("skip", &SharedDetector::skip, py::arg("timestamp_s") = py::none(),
+           "Counts a frame without a usable image, so that numbers keep step with the camera.")
+      .def("__len__", &SharedDetector::size)
+      .def_property_readonly("options", &SharedDetector::options, "A copy of its settings.")
+      .def("__repr__", [](const SharedDetector& self) {
+        return fmt::format("LoopDetector({} frames)", self.size());
+      });
+}
+
+}  // namespace loopbit::python

@@ -1,0 +1,183 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <utility>
+#include <vector>
+
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/evaluation.hpp"
+#include "loopbit/match_list.hpp"
+#include "loopbit/protocol.hpp"
+
+#include "bindings.hpp"
+#include "numpy_image.hpp"
+#include "settings.hpp"
+
+namespace loopbit::python {
+namespace {
+
+namespace py = pybind11;
+
+template <typename Value>
+using Column = py::array_t<Value, py::array::c_style | py::array::forcecast>;
+
+/// Throws ValueError unless a column has one value a row.
+void check_column(const py::array& column, py::ssize_t rows, const char* name) {
+  if (column.ndim() == 1 && column.shape(0) == rows) return;
+  throw py::value_error(fmt::format("{} has shape {}, but must be ({},), as query has.", name,
+                                    literal(column.attr("shape")), rows));
+}
+
+MatchList list_of(const Column<int>& query, const Column<int>& match,
+                  const std::optional<Column<double>>& score,
+                  const std::optional<Column<bool>>& is_loop) {
+  const py::ssize_t rows = query.size();
+  check_column(query, rows, "query");
+  check_column(match, rows, "match");
+  if (score) check_column(*score, rows, "score");
+  if (is_loop) check_column(*is_loop, rows, "is_loop");
+  MatchList list;
+  list.matches.reserve(static_cast<std::size_t>(rows));
+  for (py::ssize_t row = 0; row < rows; ++row) {
+    list.matches.push_back({.query = query.at(row),
+                            .match = match.at(row),
+                            .score = score ? score->at(row) : 1.0,
+                            .is_loop = is_loop ? is_loop->at(row) : true});
+  }
+  return list;
+}
+
+void bind_matches(py::module_& module) {
+  py::class_<MatchList>(module, "MatchList",
+                        "What a detector, any detector, says about a sequence.")
+      .def(py::init(&list_of), py::arg("query"), py::arg("match"), py::arg("score") = py::none(),
+           py::arg("is_loop") = py::none(),
+           "One value a match: two frames, how sure (1 if not given), and whether the detector "
+           "accepts it (true if not given).")
+      .def_property_readonly(
+          "matches", [](const MatchList& self) { return take(self.matches); },
+          "Structured array of query, match, score and is_loop.")
+      .def_property_readonly(
+          "times_s", [](const MatchList& self) { return self.times_s; },
+          "Seconds or None, one a frame; empty where frames are not listed.")
+      .def("__len__", [](const MatchList& self) { return self.matches.size(); })
+      .def("__repr__", [](const MatchList& self) {
+        return fmt::format("MatchList({} matches)", self.matches.size());
+      });
+  module.def(
+      "read_match_list",
+      [](const std::filesystem::path& path) { return read_match_list(path.string()); },
+      py::arg("path"), "Reads a loops.csv, or any CSV of query,match[,score].");
+}
+
+template <typename Counts>
+void bind_shares(py::class_<Counts>& type) {
+  type.def_property_readonly("recall", &Counts::recall, "right / positives; 0 without positives.")
+      .def_property_readonly("precision", &Counts::precision,
+                             "right / (right + wrong); 1 without loops.")
+      .def("__repr__", [](const Counts& self) {
+        return fmt::format("right {} of {}, wrong {}: recall {:.4f}, precision {:.4f}", self.right,
+                           self.positives, self.wrong, self.recall(), self.precision());
+      });
+}
+
+void bind_counts(py::module_& module) {
+  py::class_<DecisionCounts> decision(module, "DecisionCounts",
+                                      "What the decisions of a detector come to, query by query.");
+  decision
+      .def_readonly("positives", &DecisionCounts::positives,
+                    "Queries that are scored and have a true earlier place.")
+      .def_readonly("right", &DecisionCounts::right)
+      .def_readonly("tolerated", &DecisionCounts::tolerated)
+      .def_readonly("wrong", &DecisionCounts::wrong)
+      .def_readonly("ignored", &DecisionCounts::ignored, "Queries left out of the score.");
+  bind_shares(decision);
+  py::class_<PairCounts> pairs(module, "PairCounts", "What they come to pair by pair.");
+  pairs.def_readonly("positives", &PairCounts::positives, "All true pairs of frames.")
+      .def_readonly("right", &PairCounts::right)
+      .def_readonly("wrong", &PairCounts::wrong);
+  bind_shares(pairs);
+}
+
+void bind_result(py::module_& module) {
+  py::class_<Evaluation>(module, "Evaluation", "How good a detector's matches are.")
+      .def_readonly("decision", &Evaluation::decision, "Query by query, as decided.")
+      .def_readonly("pairs", &Evaluation::pairs, "Pair by pair, as decided.")
+      .def_property_readonly(
+          "curve", [](const Evaluation& self) { return take(self.curve); },
+          "The precision-recall curve: structured array of score, right, wrong, precision and "
+          "recall, a row for each score that occurs, from the highest.")
+      .def_readonly("recall_at_full_precision", &Evaluation::recall_at_full_precision)
+      .def_readonly("score_at_full_precision", &Evaluation::score_at_full_precision,
+                    "The lowest score with no wrong match at it or above, or None.")
+      .def_readonly("average_precision", &Evaluation::average_precision)
+      .def_property_readonly(
+          "wrong_loops", [](const Evaluation& self) { return take(self.wrong_loops); },
+          "Structured array of query, match, score and is_loop.")
+      .def_property_readonly(
+          "missed", [](const Evaluation& self) -> py::array_t<int> { return take(self.missed); },
+          "Revisits without a right loop.")
+      .def_property_readonly(
+          "protocol", [](const Evaluation& self) { return self.options.protocol; },
+          "Its name; empty if it has none.")
+      .def_property_readonly("tolerance_frames",
+                             [](const Evaluation& self) { return self.options.tolerance_frames; })
+      .def(
+          "to_json", [](const Evaluation& self, bool full) { return to_json(self, full); },
+          py::arg("full") = true, "As loopbit eval --json prints it; full adds the lists.")
+      .def("__repr__", [](const Evaluation& self) {
+        return fmt::format(
+            "Evaluation(recall={:.4f}, precision={:.4f}, wrong={}, "
+            "recall_at_full_precision={:.4f}, "
+            "average_precision={:.4f})",
+            self.decision.recall(), self.decision.precision(), self.decision.wrong,
+            self.recall_at_full_precision, self.average_precision);
+      });
+}
+
+void bind_protocols(py::module_& module) {
+  py::class_<Protocol>(module, "Protocol",
+                       "A published way of scoring: its name fixes all settings.")
+      .def_property_readonly("name", [](const Protocol& self) { return std::string(self.name); })
+      .def_property_readonly(
+          "help", [](const Protocol& self) { return std::string(self.help); }, "One line.")
+      .def_readonly("truth_kind", &Protocol::truth_kind, "What it is defined on.")
+      .def_readonly("tolerance_frames", &Protocol::tolerance_frames)
+      .def_property_readonly(
+          "poses", [](const Protocol& self) { return self.truth.poses; },
+          "When two poses show the same place.")
+      .def_property_readonly(
+          "views", [](const Protocol& self) { return self.truth.views; },
+          "Rows a frame has in a loop matrix.")
+      .def("__repr__", [](const Protocol& self) {
+        return fmt::format("Protocol('{}': {})", self.name, self.help);
+      });
+  module.def(
+      "protocols", [] { return std::vector<Protocol>(protocols().begin(), protocols().end()); },
+      "All published ways of scoring that are known by name.");
+  module.def("find_protocol", &find_protocol, py::arg("name"), "The one of that name.");
+}
+
+}  // namespace
+
+void bind_evaluation(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(ReportedMatch, query, match, score, is_loop);
+  PYBIND11_NUMPY_DTYPE(CurvePoint, score, right, wrong, precision, recall);
+  bind_matches(module);
+  bind_counts(module);
+  bind_result(module);
+  bind_protocols(module);
+  module.def(
+      "_evaluate",
+      [](const MatchList& list, const GroundTruth& truth, int tolerance_frames,
+         const std::string& protocol) {
+        return evaluate(list, truth, {tolerance_frames, protocol});
+      },
+      py::arg("matches"), py::arg("truth"), py::arg("tolerance_frames"), py::arg("protocol"),
+      py::call_guard<py::gil_scoped_release>());
+}
+
+}  // namespace loopbit::python

@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+
+#include "loopbit/place_index.hpp"
+
+#include "bindings.hpp"
+#include "numpy_image.hpp"
+
+namespace loopbit::python {
+namespace {
+
+namespace py = pybind11;
+
+}  // namespace
+
+void bind_place_index(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(Candidate, place, similarity);
+  py::class_<PlaceIndex>(
+      module, "PlaceIndex",
+      "The binary contents of all places, and the question which of them look like a query.")
+      .def(py::init<>())
+      // The GIL is kept: it lets one thread add at a time, which is what the index allows.
+      .def("add", &PlaceIndex::add, py::arg("content"), "Adds a place and returns its number.")
+      .def("__len__", &PlaceIndex::size)
+      .def(
+          "content", [](const PlaceIndex& self, PlaceId place) { return self.content(place); },
+          py::arg("place"), "A place's content. Raises IndexError where there is none.")
+      .def(
+          "query",
+          [](const PlaceIndex& self, const BinaryContent& content, std::optional<PlaceId> end,
+             const RetrievalOptions& options) {
+            std::vector<Candidate> candidates;
+            {
+              const py::gil_scoped_release release;
+              candidates = self.query(content, end.value_or(self.size()), options);
+            }
+            return take(std::move(candidates));
+          },
+          py::arg("content"), py::arg("end") = py::none(),
+          py::arg_v("options", RetrievalOptions{}, "RetrievalOptions()"),
+          "The most similar places among those numbered below end (None: all), best first, exactly "
+          "as a full scan would find them: structured array of place and similarity.")
+      .def("__repr__", [](const PlaceIndex& self) {
+        return fmt::format("PlaceIndex({} places)", self.size());
+      });
+}
+
+}  // namespace loopbit::python

@@ -1,0 +1,38 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <string>
+
+#include <pybind11/stl/filesystem.h>
+
+#include "loopbit/report.hpp"
+
+#include "bindings.hpp"
+
+namespace loopbit::python {
+namespace {
+
+namespace py = pybind11;
+
+void write_run_report(const FinishedRun& run, const std::string& name,
+                      const std::filesystem::path& path, int tolerance_frames,
+                      const std::string& protocol) {
+  ReportRun column;
+  column.name = name;
+  column.list = match_list(run.detections);
+  column.run = run;
+  column.positions_m = run.positions_m;
+  column.truth = run.truth;
+  column.evaluation = {tolerance_frames, protocol};
+  write_report(path.string(), {column});
+}
+
+}  // namespace
+
+void bind_report(py::module_& module) {
+  module.def("_write_report", &write_run_report, py::arg("run"), py::arg("name"), py::arg("path"),
+             py::arg("tolerance_frames"), py::arg("protocol"),
+             py::call_guard<py::gil_scoped_release>());
+}
+
+}  // namespace loopbit::python

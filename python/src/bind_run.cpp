@@ -1,0 +1,191 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <memory>
+#include <utility>
+
+#include <pybind11/functional.h>
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/evaluation.hpp"
+#include "loopbit/evidence_file.hpp"
+#include "loopbit/finished_run.hpp"
+#include "loopbit/run_folder.hpp"
+#include "loopbit/runner.hpp"
+
+#include "bind_data.hpp"
+#include "bind_detector.hpp"
+#include "bindings.hpp"
+#include "numpy_image.hpp"
+#include "settings.hpp"
+
+namespace loopbit::python {
+namespace {
+
+namespace py = pybind11;
+
+using Path = std::filesystem::path;
+using OnDetection = std::function<void(const Detection&)>;
+using OnBadFrame = std::function<void(const std::string&)>;
+using Times = std::vector<std::optional<double>>;
+using Positions = py::array_t<double, py::array::c_style | py::array::forcecast>;
+
+/// What Python is told between two frames: the interpreter's own signals (Ctrl-C raises), then the
+/// callback.
+template <typename Callback, typename... Arguments>
+void tell(const Callback& callback, const Arguments&... arguments) {
+  const py::gil_scoped_acquire acquire;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  if (callback) callback(arguments...);
+}
+
+std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector,
+                                  const OnDetection& on_detection, const OnBadFrame& on_bad_frame) {
+  std::vector<Detection> detections;
+  const RunListener listener{
+      .on_detection =
+          [&](const Detection& detection) {
+            detections.push_back(detection);
+            tell(on_detection, detection);
+          },
+      .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, sentence); }};
+  const std::atomic<bool> never{false};
+  {
+    const py::gil_scoped_release release;
+    detector.exclusively([&](LoopDetector& free) { run(source, free, listener, never); });
+  }
+  return detections;
+}
+
+/// A run that leaves its evidence in a folder, as loopbit run does. Python calls detect(), what is
+/// to be kept with it, and finish(), whatever happened before.
+class RecordedRun {
+ public:
+  RecordedRun(SharedSource& source, const Path& out, const LoopDetectorOptions& options,
+              bool overwrite, bool keep_evidence)
+      : source_(source),
+        detector_(options),
+        folder_(out.string(), overwrite),
+        record_{.input = source.input(),
+                .description = source.description(),
+                .options = options,
+                .every = source.every(),
+                .limit = source.limit()} {
+    if (keep_evidence) evidence_ = std::make_unique<EvidenceWriter>(folder_.evidence_path());
+  }
+
+  void detect(const OnBadFrame& on_bad_frame) {
+    RunListener listener{
+        .on_detection =
+            [&](const Detection& detection) {
+              folder_.add(detection);
+              tell(OnDetection{}, detection);
+            },
+        .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, sentence); }};
+    if (evidence_) {
+      listener.on_evidence = [&](const Detection& detection, const cv::Mat& image,
+                                 const Evidence& seen) {
+        evidence_->add(detection.frame, image, seen);
+      };
+    }
+    const std::atomic<bool> never{false};
+    const py::gil_scoped_release release;
+    const auto start = std::chrono::steady_clock::now();
+    run(source_, detector_, listener, never);
+    if (evidence_) evidence_->finish();
+    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
+    record_.wall_s = elapsed.count();
+  }
+
+  [[nodiscard]] Times times_s() const { return match_list(folder_.detections()).times_s; }
+
+  void score(const GroundTruth& truth, int tolerance_frames, const std::string& protocol) {
+    folder_.write_truth(truth);
+    record_.score = evaluate(match_list(folder_.detections()), truth, {tolerance_frames, protocol});
+  }
+
+  void keep_positions(const Positions& positions_m) {
+    if (positions_m.ndim() != 2 || positions_m.shape(1) != 3) {
+      throw py::value_error(fmt::format("positions_m has shape {}, but must be (n, 3).",
+                                        literal(positions_m.attr("shape"))));
+    }
+    std::vector<std::optional<cv::Vec3d>> rows(static_cast<std::size_t>(positions_m.shape(0)));
+    for (py::ssize_t row = 0; row < positions_m.shape(0); ++row) {
+      const cv::Vec3d position(positions_m.data(row, 0));
+      if (!std::isnan(cv::norm(position))) rows[static_cast<std::size_t>(row)] = position;
+    }
+    folder_.write_positions(rows);
+  }
+
+  void finish(const std::string& stopped_by) {
+    record_.stopped_by = stopped_by;
+    folder_.finish(record_);
+  }
+
+ private:
+  SharedSource& source_;
+  LoopDetector detector_;
+  RunFolder folder_;
+  std::unique_ptr<EvidenceWriter> evidence_;
+  RunRecord record_;
+};
+
+std::map<PlaceId, BinaryContent> contents_of(const FinishedRun& run) {
+  std::map<PlaceId, BinaryContent> contents;
+  if (run.evidence_path.empty()) return contents;
+  EvidenceReader(run.evidence_path)
+      .for_each_content([&](PlaceId frame, const BinaryContent& content) {
+        contents.emplace_hint(contents.end(), frame, content);
+      });
+  return contents;
+}
+
+void bind_finished_run(py::module_& module) {
+  py::class_<FinishedRun>(module, "FinishedRun", "What a run left in its folder.")
+      .def_readonly("path", &FinishedRun::path)
+      .def_readonly("detections", &FinishedRun::detections, "A Detection a frame.")
+      .def_readonly("truth", &FinishedRun::truth, "As it was given to the run, or None.")
+      .def_readonly("record_json", &FinishedRun::record_json,
+                    "run.json; empty if the run did not end in order.")
+      .def_property_readonly(
+          "positions_m", [](const FinishedRun& self) { return to_array(self.positions_m); },
+          "Camera centres, shape (n, 3), nan where not known; n is 0 where the "
+          "run had no poses.")
+      .def("contents", &contents_of,
+           "The binary content of each readable frame, by its number; none without evidence.")
+      .def("__repr__", [](const FinishedRun& self) {
+        return fmt::format("FinishedRun('{}', {} frames)", self.path, self.detections.size());
+      });
+  module.def(
+      "read_run", [](const Path& path) { return read_run(path.string()); }, py::arg("path"),
+      "Reads a run folder, also one whose run was cut off.");
+}
+
+}  // namespace
+
+void bind_run(py::module_& module) {
+  bind_finished_run(module);
+  module.def("match_list", &match_list, py::arg("detections"),
+             "What detections say, as any detector's list would.");
+  module.def("_run", &run_source, py::arg("source"), py::arg("detector"), py::arg("on_detection"),
+             py::arg("on_bad_frame"));
+  py::class_<RecordedRun>(module, "_RecordedRun")
+      .def(py::init<SharedSource&, const Path&, const LoopDetectorOptions&, bool, bool>(),
+           py::arg("source"), py::arg("out"), py::arg("options"), py::arg("overwrite"),
+           py::arg("evidence"), py::keep_alive<1, 2>())
+      .def("detect", &RecordedRun::detect, py::arg("on_bad_frame"))
+      .def_property_readonly("times_s", &RecordedRun::times_s)
+      .def("score", &RecordedRun::score, py::arg("truth"), py::arg("tolerance_frames"),
+           py::arg("protocol"))
+      .def("keep_positions", &RecordedRun::keep_positions, py::arg("positions_m"))
+      .def("finish", &RecordedRun::finish, py::arg("stopped_by"));
+}
+
+}  // namespace loopbit::python

@@ -1,0 +1,23 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <pybind11/pybind11.h>
+
+namespace loopbit::python {
+
+// Each adds one group of types and functions to the module, in an order in which a type comes
+// before what uses it.
+void bind_errors(pybind11::module_& module);
+void bind_options(pybind11::module_& module);
+void bind_content(pybind11::module_& module);
+void bind_features(pybind11::module_& module);
+void bind_place_index(pybind11::module_& module);
+void bind_detector(pybind11::module_& module);
+void bind_data(pybind11::module_& module);
+void bind_evaluation(pybind11::module_& module);
+void bind_world(pybind11::module_& module);
+void bind_run(pybind11::module_& module);
+void bind_report(pybind11::module_& module);
+
+}  // namespace loopbit::python

@@ -1,0 +1,36 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <opencv2/core/utils/logger.hpp>
+#include <pybind11/pybind11.h>
+
+#include "loopbit/kernels.hpp"
+#include "loopbit/version.hpp"
+
+#include "bindings.hpp"
+
+PYBIND11_MODULE(_loopbit, module) {
+  namespace python = loopbit::python;
+  module.doc() = "The compiled part of loopbit; import loopbit instead.";
+  // What it defines belongs to the package, for who reads a signature or a pickle.
+  const pybind11::object own_name = module.attr("__name__");
+  module.attr("__name__") = "loopbit";
+  module.attr("__version__") = loopbit::kVersion;
+  // Bad images are reported by loopbit, in its own words.
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  python::bind_errors(module);
+  module.def(
+      "active_kernel", [] { return std::string(loopbit::active_kernels().name); },
+      "The instruction set whose inner loops run: scalar, avx2 or avx512; LOOPBIT_KERNEL forces "
+      "one.");
+  python::bind_options(module);
+  python::bind_content(module);
+  python::bind_features(module);
+  python::bind_place_index(module);
+  python::bind_detector(module);
+  python::bind_data(module);
+  python::bind_evaluation(module);
+  python::bind_world(module);
+  python::bind_run(module);
+  python::bind_report(module);
+  module.attr("__name__") = own_name;
+}

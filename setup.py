@@ -1,0 +1,54 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""Builds the Python package with the CMake project around it; all else stands in pyproject.toml.
+
+CMAKE_ARGS holds more arguments for CMake, separated as in a shell. LOOPBIT_BUILD_DIR names a build
+folder to build in, so that what is compiled there is not compiled again.
+"""
+
+import os
+import pathlib
+import re
+import shlex
+import subprocess
+import sys
+
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
+
+ROOT = pathlib.Path(__file__).resolve().parent
+
+
+class BuildWithCMake(build_ext):
+    """Has CMake build the one extension, and copies it to where setuptools expects it."""
+
+    def build_extension(self, ext):
+        build = os.environ.get("LOOPBIT_BUILD_DIR")
+        if build is None:
+            build = pathlib.Path(self.build_temp).resolve()
+            cmake("-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
+                  "-DLOOPBIT_BUILD_PYTHON=ON", "-DLOOPBIT_BUILD_CLI=OFF",
+                  "-DLOOPBIT_BUILD_TESTS=OFF", "-DLOOPBIT_BUILD_BENCHMARKS=OFF",
+                  f"-DPython3_EXECUTABLE={sys.executable}",
+                  *shlex.split(os.environ.get("CMAKE_ARGS", "")))
+        jobs = self.parallel or os.cpu_count()
+        cmake("--build", build, "--target", "loopbit_python", "--parallel", jobs)
+        target = pathlib.Path(self.get_ext_fullpath(ext.name))
+        self.mkpath(str(target.parent))
+        self.copy_file(str(pathlib.Path(build) / "python/loopbit" / target.name), str(target))
+
+
+def cmake(*arguments):
+    subprocess.run(["cmake", *map(str, arguments)], check=True)
+
+
+def version():
+    """The one that stands in the project() of the top CMakeLists.txt."""
+    return re.search(r"^  VERSION (\S+)$", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
+
+
+setup(
+    version=version(),
+    ext_modules=[Extension("loopbit._loopbit", sources=[])],
+    cmdclass={"build_ext": BuildWithCMake},
+)

@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# Builds the examples against the loopbit installed in PREFIX, and runs them on the built-in world.
+#
+#   examples_test.sh PYTHON PREFIX SCRATCH
+set -euo pipefail
+
+python=$1
+prefix=$2
+scratch=$3
+examples=$(dirname "$(dirname "$(readlink -f "$0")")")/examples
+export PYTHONPATH=$prefix/lib/python3/dist-packages PYTHONDONTWRITEBYTECODE=1
+
+rm -rf "$scratch"
+mkdir -p "$scratch"
+"$prefix/bin/loopbit" demo --frames 150 --world spacing_m=1.5 --world laps=2 --world width_px=320 \
+  --world height_px=240 --write-images "$scratch/town" 2>"$scratch/progress"
+
+cmake -S "$examples" -B "$scratch/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix"
+cmake --build "$scratch/build"
+"$scratch/build/keyframe_slam" "$scratch/town/images" | tee "$scratch/edges"
+grep -q '^edge [0-9]* -> [0-9]*, score' "$scratch/edges"
+
+"$python" "$examples/find_loops.py" "$scratch/town/images" | tee "$scratch/loops"
+"$prefix/bin/loopbit" run "$scratch/town/images" --out "$scratch/run" --no-report 2>"$scratch/progress"
+# As many as the command finds.
+[[ $(wc -l <"$scratch/loops") == $(grep -c ',loop,' "$scratch/run/loops.csv") ]]
+
+"$python" "$examples/paper_figures.py" "$scratch/town/images" "$scratch/town/truth.csv" \
+  "$scratch/figures" "$scratch/town/poses.txt"
+for name in precision_recall times similarity trajectory; do
+  [[ $(head -c 4 "$scratch/figures/$name.pdf") == %PDF ]]
+done
+test -s "$scratch/figures/report.html"

@@ -1,0 +1,135 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+import json
+import pathlib
+import sys
+import threading
+
+import numpy as np
+import pytest
+from conftest import as_row, decisions
+
+import loopbit
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+
+
+def test_frame_by_frame_as_the_command(command, dataset, images, tmp_path):
+    command("run", dataset / "images", "--out", tmp_path / "run", "--no-report")
+    detector = loopbit.LoopDetector()
+    found = [as_row(detector.process(image)) for image in images]
+    assert found == decisions(tmp_path / "run")
+    assert sum(row["status"] == "loop" for row in found) > 20
+
+
+def test_corridor_loop_as_the_command(command, corridor, tmp_path):
+    flags = [flag for file in ("truth", "not_false", "ignore")
+             for flag in (f"--{file.replace('_', '-')}", corridor / f"{file}.csv")]
+    command("run", corridor / "images", "--out", tmp_path / "cpp", "--no-report", *flags)
+    expected = decisions(tmp_path / "cpp")
+
+    detector = loopbit.LoopDetector()
+    arrays = [detector.process(frame.image) for frame in loopbit.open_source(corridor / "images")]
+    assert list(map(as_row, arrays)) == expected
+    assert list(map(as_row, loopbit.run(corridor / "images"))) == expected
+
+    truth = loopbit.read_truth(corridor / "truth.csv", not_false=corridor / "not_false.csv",
+                               ignore=corridor / "ignore.csv")
+    run = loopbit.run_folder(corridor / "images", tmp_path / "python", truth=truth, evidence=False)
+    assert decisions(tmp_path / "python") == expected
+    score = loopbit.evaluate(run)
+    assert json.loads(score.to_json()) == json.loads(command("eval", tmp_path / "cpp", "--json"))
+    assert (score.decision.positives, score.decision.wrong) == (38, 0)
+
+
+def test_detection(images):
+    detector = loopbit.LoopDetector()
+    first = detector.process(images[0], timestamp_s=12.5)
+    assert first.status == loopbit.Status.no_earlier_place
+    assert (first.frame, first.timestamp_s, first.match, first.is_loop) == (0, 12.5, None, False)
+    assert repr(first) == "Detection(frame=0, status=no_earlier_place)"
+    loops = [d for d in map(detector.process, images[1:90]) if d.is_loop]
+    last = loops[-1]
+    assert last.match == pytest.approx(last.frame - 60, abs=4) and last.times.features_ms > 0
+    start = f"Detection(frame={last.frame}, status=loop, match={last.match}, score={last.score:.1f}"
+    assert repr(last).startswith(start)
+    assert repr(last.times).startswith("StepTimes(content_ms=")
+    assert as_row(detector.query(images[90])) == as_row(detector.query(images[90]))
+    assert len(detector) == 90 and repr(detector) == "LoopDetector(90 frames)"
+    assert detector.skip().status.name == "unreadable" and len(detector) == 91
+
+
+def test_every_status_is_explained():
+    page = (ROOT / "docs/no_loop.md").read_text()
+    for status in loopbit.Status.__members__:
+        assert status == "loop" or f"\n## `{status}`\n" in page, status
+
+
+def test_evidence(images):
+    detector = loopbit.LoopDetector()
+    evidence = loopbit.Evidence()
+    assert evidence.saliency is None and evidence.inliers.size == 0
+    for image in images[:90]:
+        last = detector.process(image, evidence=evidence)
+    assert evidence.content == loopbit.binary_content(images[89])
+    assert np.array_equal(evidence.saliency, loopbit.saliency_map(images[89]))
+    inliers = evidence.inliers
+    assert inliers.dtype.names == ("query_x", "query_y", "match_x", "match_y")
+    assert len(inliers) == last.inliers and 0 <= inliers["match_x"].min() <= 1
+
+
+def test_time_must_not_go_back(images):
+    detector = loopbit.LoopDetector(loopbit.LoopDetectorOptions(
+        exclusion=loopbit.ExclusionOptions(seconds=1.0)))
+    detector.process(images[0], 2.0)
+    with pytest.raises(loopbit.InputError):
+        detector.process(images[1], 1.0)
+    with pytest.raises(TypeError):
+        detector.process(images[1], "now")
+    assert len(detector) == 1
+
+
+def test_other_threads_run_meanwhile(world, images):
+    """With a switch interval of hours, another thread moves only where the GIL is given up."""
+    steps, stop = 0, threading.Event()
+
+    def count():
+        nonlocal steps
+        while not stop.wait(0.0005):
+            steps += 1
+
+    counter = threading.Thread(target=count)
+    interval = sys.getswitchinterval()
+    detector = loopbit.LoopDetector()
+    work = [lambda: world.render(0), lambda: detector.process(images[0]),
+            lambda: detector.query(images[0]), lambda: loopbit.extract_surf(images[0])]
+    sys.setswitchinterval(10_000)
+    try:
+        counter.start()
+        for call in work:
+            before = steps
+            for _ in range(200):
+                call()
+                if steps > before:
+                    break
+            assert steps > before
+    finally:
+        sys.setswitchinterval(interval)
+        stop.set()
+        counter.join()
+
+
+def test_threads_may_share_a_detector(images):
+    detector = loopbit.LoopDetector()
+
+    def work():
+        for image in images[:20]:
+            detector.process(image)
+            detector.query(image)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(detector) == 80

@@ -1,0 +1,172 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+import json
+
+import numpy as np
+import pytest
+from conftest import as_row, decisions
+
+import loopbit
+
+
+def test_run_folder_is_that_of_the_command(command, dataset, run, tmp_path):
+    command("run", dataset / "images", "--out", tmp_path / "cpp", "--truth", dataset / "truth.csv",
+            "--not-false", dataset / "not_false.csv", "--poses", dataset / "poses.txt")
+    ours = loopbit.run_folder(dataset / "images", tmp_path / "python",
+                              truth=loopbit.read_truth(dataset / "truth.csv",
+                                                       not_false=dataset / "not_false.csv"),
+                              positions_m=dataset / "poses.txt")
+    assert decisions(ours.path) == decisions(tmp_path / "cpp")
+    for file in ("truth.csv", "not_false.csv", "ignore.csv", "positions.csv"):
+        assert (tmp_path / "python" / file).read_bytes() == (tmp_path / "cpp" / file).read_bytes()
+    records = [json.loads((tmp_path / side / "run.json").read_text()) for side in ("python", "cpp")]
+    for field in ("loopbit", "input", "stopped_by", "options", "counts", "score"):
+        assert records[0][field] == records[1][field], field
+    theirs = loopbit.read_run(tmp_path / "cpp")
+    assert ours.contents() == theirs.contents() and len(ours.contents()) == 120
+    assert [as_row(d) for d in ours.detections] == [
+        {**as_row(d), "timestamp": ""} for d in run.detections]
+
+
+def test_finished_run(run, world):
+    assert run.positions_m.shape == (120, 3) and run.truth.same_place.size > 0
+    array = loopbit.detections_array(run.detections)
+    assert array.dtype.names[:4] == ("frame", "timestamp_s", "status", "match")
+    assert np.array_equal(array["frame"], np.arange(120))
+    loops = array[array["status"] == "loop"]
+    assert len(loops) == sum(d.is_loop for d in run.detections) > 20 and loops["match"].min() >= 0
+    assert array["match"][0] == -1 and array["timestamp_s"][10] == pytest.approx(1.0)
+    assert {d.status.name for d in run.detections} == set(array["status"])
+
+
+def test_callbacks(dataset, images, tmp_path):
+    folder = tmp_path / "images"
+    folder.mkdir()
+    for number in range(3):
+        data = (dataset / "images" / f"00000{number}.png").read_bytes()
+        (folder / f"{number}.png").write_bytes(data if number != 1 else data[:100])
+    told, bad = [], []
+    found = loopbit.run(folder, on_detection=told.append, on_bad_frame=bad.append)
+    assert [d.status.name for d in found] == ["no_earlier_place", "unreadable", "no_earlier_place"]
+    assert [d.frame for d in told] == [0, 1, 2] and len(bad) == 1 and "1.png" in bad[0]
+    with pytest.warns(UserWarning, match="1.png"):
+        loopbit.run(folder)
+
+
+def test_a_callback_may_ask_the_detector_that_runs(world, images):
+    detector = loopbit.LoopDetector()
+    asked = []
+    loopbit.run(loopbit.World(world.options).source(), detector,
+                on_detection=lambda d: asked.append(detector.query(images[d.frame]).frame))
+    assert asked == list(range(1, 121))
+
+
+@pytest.mark.parametrize("error, stopped_by", [(RuntimeError("enough"), "enough"),
+                                               (KeyboardInterrupt(), "interrupt")])
+def test_a_run_that_is_stopped_keeps_what_it_found(tmp_path, dataset, error, stopped_by):
+    folder = tmp_path / "images"
+    folder.mkdir()
+    (folder / "0.png").write_bytes((dataset / "images" / "000000.png").read_bytes())
+    (folder / "1.png").write_bytes(b"no image")
+
+    def stop(sentence):
+        raise error
+
+    with pytest.raises(type(error)):
+        loopbit.run_folder(folder, tmp_path / "run", on_bad_frame=stop)
+    assert json.loads((tmp_path / "run" / "run.json").read_text())["stopped_by"] == stopped_by
+    assert len(decisions(tmp_path / "run")) == 1
+    with pytest.raises(OSError, match="holds an earlier run"):
+        loopbit.run_folder(folder, tmp_path / "run")
+    loopbit.run_folder(folder, tmp_path / "run", overwrite=True, on_bad_frame=lambda _: None)
+
+
+def test_every_nth_frame(dataset, world, tmp_path):
+    source = loopbit.open_source(dataset / "images", every=2)
+    with pytest.raises(loopbit.OptionError, match="every_nth"):
+        loopbit.run_folder(source, tmp_path / "run", truth=dataset / "truth.csv")
+    run = loopbit.run_folder(source, tmp_path / "run", evidence=False,
+                             truth=loopbit.every_nth(world.truth(), 2))
+    assert json.loads(run.record_json)["input"]["every"] == 2 and len(run.detections) == 60
+    assert loopbit.evaluate(run).decision.positives > 20
+
+
+def test_score_is_that_of_the_command(command, run, dataset):
+    for flags, arguments in (
+            ([], {}),
+            (["--tolerance", 3], {"truth": loopbit.read_truth(dataset / "truth.csv"),
+                                  "tolerance_frames": 3}),
+            (["--protocol", "kitti"], {"truth": dataset / "poses.txt", "protocol": "kitti"})):
+        if "--tolerance" in flags:
+            flags = ["--truth", dataset / "truth.csv", *flags]
+        if "--protocol" in flags:
+            flags = ["--truth", dataset / "poses.txt", *flags]
+        expected = json.loads(command("eval", run.path, "--json", *flags))
+        for found in (run, run.path, run.detections if arguments else run):
+            assert json.loads(loopbit.evaluate(found, **arguments).to_json()) == expected
+
+
+def test_a_run_is_scored_again_as_it_was(command, dataset, world, tmp_path):
+    matrix = np.zeros((len(world), len(world)), int)
+    for query, first, last in world.truth().same_place.tolist():
+        matrix[query, first:last + 1] = 1
+    np.savetxt(tmp_path / "matrix.txt", matrix, fmt="%d")
+    run = loopbit.run_folder(dataset / "images", tmp_path / "run", evidence=False,
+                             truth=tmp_path / "matrix.txt", protocol="ibow-lcd")
+    score = loopbit.evaluate(run)
+    assert (score.protocol, score.tolerance_frames) == ("ibow-lcd", 40)
+    assert json.loads(score.to_json()) == json.loads(command("eval", run.path, "--json"))
+    assert loopbit.evaluate(run, tolerance_frames=0).protocol == ""
+
+
+def test_evaluation_of_arrays():
+    truth = loopbit.GroundTruth([[10, 0, 2], [11, 1, 3], [12, 2, 4]], [[13, 5]], [14])
+    found = loopbit.MatchList(query=[10, 11, 12, 13, 14], match=[1, 2, 9, 5, 0],
+                              score=[0.9, 0.8, 0.7, 0.6, 0.5])
+    score = loopbit.evaluate(found, truth)
+    decision = score.decision
+    assert (decision.positives, decision.right, decision.wrong, decision.tolerated,
+            decision.ignored) == (3, 2, 1, 1, 1)
+    assert score.recall_at_full_precision == pytest.approx(2 / 3) == decision.recall
+    assert score.score_at_full_precision == 0.8
+    curve = score.curve[:3]  # the fourth match is tolerated, and changes nothing
+    assert curve["precision"].tolist() == pytest.approx([1, 1, 2 / 3])
+    assert curve["recall"].tolist() == pytest.approx([1 / 3, 2 / 3, 2 / 3])
+    assert score.wrong_loops["query"].tolist() == [12] == score.missed.tolist()
+    assert "precision 0.6667" in repr(decision) and "wrong=1" in repr(score)
+    assert loopbit.evaluate(found, truth, tolerance_frames=5).decision.right == 3
+
+
+def test_bad_evaluations(run, dataset):
+    with pytest.raises(ValueError, match=r"score has shape \(1,\), but must be \(2,\)"):
+        loopbit.MatchList([1, 2], [0, 0], [1.0])
+    with pytest.raises(ValueError, match=r"same_place has shape \(1, 4\)"):
+        loopbit.GroundTruth([[1, 2, 3, 4]])
+    with pytest.raises(ValueError, match="no protocol 'nobody'"):
+        loopbit.evaluate(run, protocol="nobody")
+    with pytest.raises(ValueError, match="fixes it"):
+        loopbit.evaluate(run, protocol="kitti", tolerance_frames=1)
+    with pytest.raises(ValueError, match="fixes them"):
+        loopbit.read_truth(dataset / "poses.txt", protocol="kitti", views=2)
+    with pytest.raises(ValueError, match="defined on poses, but .* is a list of true places"):
+        loopbit.evaluate(run, dataset / "truth.csv", protocol="kitti")
+    with pytest.raises(ValueError, match="what is true"):
+        loopbit.evaluate(loopbit.MatchList([1], [0]))
+    with pytest.raises(ValueError, match="tolerance_frames is -1"):
+        loopbit.evaluate(run, tolerance_frames=-1)
+
+
+def test_protocols():
+    named = {protocol.name: protocol for protocol in loopbit.protocols()}
+    assert named["kitti"].poses.radius_m == 6.0 and named["fab-map"].views == 2
+    assert loopbit.find_protocol("ibow-lcd").tolerance_frames == 40
+    assert named["kitti"].truth_kind == loopbit.TruthKind.poses
+
+
+def test_report(command, run, tmp_path):
+    path = loopbit.write_report(run)
+    assert path == run.path + "/report.html"
+    command("report", run.path, "--out", tmp_path / "command.html")
+    with open(path) as ours, open(tmp_path / "command.html") as theirs:
+        assert ours.read() == theirs.read()
+    assert loopbit.write_report(run.path, tmp_path / "other.html") == str(tmp_path / "other.html")

@@ -1,0 +1,120 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+import json
+import pickle
+import re
+
+import pytest
+
+import loopbit
+
+STRUCTS = [
+    loopbit.BinaryContentOptions,
+    loopbit.RetrievalOptions,
+    loopbit.SurfOptions,
+    loopbit.VerificationOptions,
+    loopbit.ExclusionOptions,
+    loopbit.DecisionOptions,
+    loopbit.PoseTruthOptions,
+    loopbit.WorldOptions,
+]
+
+
+def settings_of(options):
+    return {name: getattr(options, name) for name, value in vars(type(options)).items()
+            if isinstance(value, property)}
+
+
+def test_every_default_is_that_of_the_command(command):
+    expected = json.loads(command("options", "--json"))
+    options = loopbit.LoopDetectorOptions()
+    assert {name: settings_of(part) for name, part in settings_of(options).items()} == expected
+
+
+def test_detector_has_the_defaults():
+    assert repr(loopbit.LoopDetector().options) == repr(loopbit.LoopDetectorOptions())
+
+
+@pytest.mark.parametrize("struct", [loopbit.WorldOptions, loopbit.PoseTruthOptions])
+def test_other_defaults_are_those_of_the_command(command, struct):
+    listed = dict(re.findall(r"^  (\w+) = (\S+)  \[", command("demo", "--help"), re.MULTILINE))
+    settings = settings_of(struct())
+    assert settings
+    for name, value in settings.items():
+        assert float(json.loads(listed[name])) == float(value), name
+
+
+@pytest.mark.parametrize("struct", STRUCTS)
+def test_settings_are_documented_with_range_and_default(struct):
+    for name, value in settings_of(struct()).items():
+        doc = getattr(struct, name).__doc__
+        assert re.fullmatch(r"(bool|int|float): .+; \S+ to \S+, default \S+", doc), doc
+        assert doc.endswith(f"default {value!r}")
+
+
+@pytest.mark.parametrize("struct", STRUCTS)
+def test_repr_can_be_evaluated(struct):
+    options = struct()
+    assert settings_of(eval(repr(options), vars(loopbit))) == settings_of(options)
+
+
+def test_sections_are_references():
+    options = loopbit.LoopDetectorOptions(surf=loopbit.SurfOptions(max_keypoints=500))
+    options.surf.upright = False
+    assert options.surf.max_keypoints == 500
+    assert loopbit.LoopDetector(options).options.surf.upright is False
+    options.surf = loopbit.SurfOptions()
+    assert repr(options) == repr(loopbit.LoopDetectorOptions())
+
+
+def test_survives_a_pickle_and_json(tmp_path):
+    options = loopbit.LoopDetectorOptions()
+    loopbit.set_option(options, "surf.upright", False)
+    loopbit.set_option(options, "decision.min_score", 31.5)
+    path = tmp_path / "settings.json"
+    path.write_text(loopbit.to_json(options))
+    for copy in (pickle.loads(pickle.dumps(options)), loopbit.load_options(path)):
+        assert repr(copy) == repr(options) != repr(loopbit.LoopDetectorOptions())
+
+
+@pytest.mark.parametrize("value", [49, 10_001, -1])
+def test_out_of_range_is_a_value_error(value):
+    options = loopbit.LoopDetectorOptions()
+    before = repr(options)
+    with pytest.raises(ValueError, match=rf"surf\.max_keypoints is {value}, but must be between"):
+        options.surf.max_keypoints = value
+    with pytest.raises(loopbit.OptionError):
+        loopbit.SurfOptions(max_keypoints=value)
+    assert repr(options) == before
+
+
+def test_not_a_number_is_out_of_range():
+    with pytest.raises(ValueError, match="binary_content.gamma is nan"):
+        loopbit.BinaryContentOptions(gamma=float("nan"))
+
+
+@pytest.mark.parametrize(
+    "name, value", [("max_keypoints", 500.5), ("max_keypoints", "500"), ("upright", 1)])
+def test_wrong_type_is_a_type_error_that_names_the_setting(name, value):
+    with pytest.raises(TypeError, match=rf"surf\.{name} is {value!r}, but must be"):
+        loopbit.SurfOptions(**{name: value})
+
+
+def test_unknown_names():
+    with pytest.raises(TypeError, match="'surf.colour'"):
+        loopbit.SurfOptions(colour=1)
+    with pytest.raises(TypeError, match="'colour'"):
+        loopbit.LoopDetectorOptions(colour=1)
+    with pytest.raises(TypeError, match="surf is .* must be SurfOptions"):
+        loopbit.LoopDetectorOptions(surf=loopbit.RetrievalOptions())
+    with pytest.raises(AttributeError):
+        loopbit.SurfOptions().colour = 1
+
+
+def test_settings_that_contradict_each_other():
+    options = loopbit.LoopDetectorOptions(
+        exclusion=loopbit.ExclusionOptions(frames=10, seconds=1.0))
+    with pytest.raises(ValueError, match="only one of them"):
+        loopbit.LoopDetector(options)
+    with pytest.raises(ValueError, match="only one of them"):
+        loopbit.validate(options)
