@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -58,6 +59,17 @@ int moved_inliers(const Features& query, const Features& place, const std::vecto
   }));
 }
 
+/// similarity(a, b) by the kernels: a map may have a million places to compare.
+double quick_similarity(const BinaryContent& a, const BinaryContent& b) {
+  const auto overlap = [](const BinaryContent& x, const BinaryContent& y) {
+    std::uint16_t pixels = 0;
+    active_kernels().max_overlaps(x.rows.data(), 1, y.rows.data(), 1, &pixels);
+    return pixels;
+  };
+  const int larger = std::max(overlap(a, a), overlap(b, b));
+  return larger == 0 ? 0.0 : static_cast<double>(overlap(a, b)) / larger;
+}
+
 /// Of a keypoint in its image, 0 to 1.
 cv::Point2f relative_position(const Features& features, int index) {
   const Keypoint& keypoint = features.keypoints[static_cast<std::size_t>(index)];
@@ -80,7 +92,7 @@ class LoopDetector::Impl {
     memory_.restore([&](const BinaryContent& content) {
       const PlaceId place = index_.add(content);
       const bool is_step =
-          place == 0 || similarity(content, index_.content(latest_step)) < kUnmovedSimilarity;
+          place == 0 || quick_similarity(content, index_.content(latest_step)) < kUnmovedSimilarity;
       if (is_step) latest_step = place;
       return is_step;
     });

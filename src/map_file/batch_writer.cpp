@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "loopbit/error.hpp"
+#include "map_schema.hpp"
 
 namespace loopbit {
 namespace {
@@ -76,12 +76,7 @@ std::int64_t BatchWriter::saved_frames() const {
   return saved_frames_;
 }
 
-void BatchWriter::close_log() {
-  try {
-    database_.execute("PRAGMA journal_mode = DELETE");
-  } catch (const Error&) {  // a reader holds the log; the last of them to close removes it
-  }
-}
+void BatchWriter::close_log() { loopbit::close_log(database_); }
 
 void BatchWriter::commit_batches() {
   std::unique_lock lock(mutex_);

@@ -71,9 +71,4 @@ void refuse_damaged(const MapReader& map) {
                           map.path(), map.damage().front(), map.damage().size()));
 }
 
-bool close_log(const Database& database) {
-  Statement statement(database, "PRAGMA journal_mode = DELETE");
-  return statement.step_if_readable() == Statement::Step::row && statement.text(0) == "delete";
-}
-
 }  // namespace loopbit

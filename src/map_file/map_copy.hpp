@@ -42,7 +42,4 @@ MapCheck copy_whole(MapReader& from, const std::vector<MapSession>& sessions, co
 /// Throws Error (kind input) if something damaged was found so far.
 void refuse_damaged(const MapReader& map);
 
-/// Leaves one file without a log beside it. False if a reader holds the log.
-bool close_log(const Database& database);
-
 }  // namespace loopbit

@@ -124,20 +124,19 @@ std::vector<MapSession> read_sessions(const Database& database, Damage& damage) 
 void for_each_place(const Database& database, const std::function<void(const MapPlace&)>& visit,
                     Damage& damage) {
   MapPlace place;
-  for_each_row(database, "place", "place, session, frame, timestamp, content, checksum", damage,
-               [&](const Statement& row, std::int64_t key) {
-                 place.id = key;
-                 place.at = session_frame(row, 1);
-                 place.timestamp_s.reset();
-                 if (!row.is_null(3)) place.timestamp_s = row.real(3);
-                 const auto content = content_from(row.bytes(4));
-                 if (content) place.content = *content;
-                 if (content && has_checksum(row, 5, checksum_of(place))) {
-                   visit(place);
-                 } else {
-                   damage.add(fmt::format("place {}: its content differs from its checksum", key));
-                 }
-               });
+  for_each_row(
+      database, "place", "place, session, frame, timestamp, content, checksum", damage,
+      [&](const Statement& row, std::int64_t key) {
+        place.id = key;
+        place.at = session_frame(row, 1);
+        place.timestamp_s.reset();
+        if (!row.is_null(3)) place.timestamp_s = row.real(3);
+        if (read_content(row.bytes(4), place.content) && has_checksum(row, 5, checksum_of(place))) {
+          visit(place);
+        } else {
+          damage.add(fmt::format("place {}: its content differs from its checksum", key));
+        }
+      });
 }
 
 std::vector<MapLoop> read_loops(const Database& database, Damage& damage) {

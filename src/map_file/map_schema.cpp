@@ -121,6 +121,16 @@ Database open_map_for_writing(const std::string& path) {
   return database;
 }
 
+bool close_log(const Database& database) {
+  try {
+    database.execute("PRAGMA busy_timeout = 0");
+    Statement mode(database, "PRAGMA journal_mode = DELETE");
+    return mode.step() && mode.text(0) == "delete";
+  } catch (const Error&) {  // it is locked
+    return false;
+  }
+}
+
 Database open_map_for_reading(const std::string& path) {
   if (!std::filesystem::is_regular_file(path)) {
     throw Error(

@@ -23,6 +23,10 @@ inline constexpr int kMapPageBytes = 16384;
 /// written.
 Database open_map_for_writing(const std::string& path);
 
+/// Leaves one file without a log beside it. False if others have the map open: the log remains, and
+/// is part of the map.
+bool close_log(const Database& database);
+
 /// Opens a map to be read, beside a writer or without. Throws as above, kind input.
 Database open_map_for_reading(const std::string& path);
 

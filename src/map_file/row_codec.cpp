@@ -73,11 +73,10 @@ std::span<const unsigned char> content_bytes(const BinaryContent& content) {
   return {reinterpret_cast<const unsigned char*>(content.rows.data()), sizeof content.rows};
 }
 
-std::optional<BinaryContent> content_from(std::span<const unsigned char> bytes) {
-  BinaryContent content;
-  if (bytes.size() != sizeof content.rows) return std::nullopt;
+bool read_content(std::span<const unsigned char> bytes, BinaryContent& content) {
+  if (bytes.size() != sizeof content.rows) return false;
   std::memcpy(content.rows.data(), bytes.data(), bytes.size());
-  return content;
+  return true;
 }
 
 std::vector<unsigned char> features_bytes(const Features& features) {

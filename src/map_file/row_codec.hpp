@@ -33,8 +33,8 @@ class Checksum {
 /// 512 bytes: 64 rows of 64 bits. Valid as long as `content`.
 std::span<const unsigned char> content_bytes(const BinaryContent& content);
 
-/// Nothing unless there are 512 bytes.
-std::optional<BinaryContent> content_from(std::span<const unsigned char> bytes);
+/// False, and `content` as it was, unless there are 512 bytes.
+bool read_content(std::span<const unsigned char> bytes, BinaryContent& content);
 
 /// 16 + 80 bytes a feature.
 std::vector<unsigned char> features_bytes(const Features& features);
