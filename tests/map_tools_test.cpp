@@ -125,11 +125,9 @@ TEST_F(MapTools, AMapThatIsReadIsNotCompacted) {
 }
 
 TEST_F(MapTools, ABudgetKeepsWhatOthersDoNotStandFor) {
-  Random random;
-  std::vector<ThinnedPlace> places;
-  for (int i = 0; i < 10; ++i) places.push_back({content_of(0), 1});
+  std::vector<ThinnedPlace> places(10, {content_of(0), 1});
   places.push_back({content_of(1), 1});
-  for (int i = 0; i < 10; ++i) places.push_back({content_of(2), 1});
+  places.insert(places.end(), 10, {content_of(2), 1});
   places.push_back({content_of(1), 2, 10});
   const auto kept = kept_places(places, 3);
   EXPECT_EQ(std::count(kept.begin(), kept.end(), true), 3);
@@ -144,6 +142,7 @@ TEST_F(MapTools, ABudgetKeepsWhatOthersDoNotStandFor) {
 TEST_F(MapTools, ThinningSpreadsOverAPath) {
   // Each place shares half its pixels with the next: no stretch may be emptied.
   std::vector<ThinnedPlace> places;
+  places.reserve(64);
   BinaryContent content = content_of(0);
   for (int i = 0; i < 64; ++i) {
     content.rows[static_cast<std::size_t>(i)] = content_of(1).rows[static_cast<std::size_t>(i)];
