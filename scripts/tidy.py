@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Runs clang-tidy over every source of ours in a finished build.
+"""Runs clang-tidy over the sources of the library and the command in a finished build.
 
 A source is skipped while all that decides its result is as it was when it last passed: its
 command, the .clang-tidy file, clang-tidy itself, and the content of each of our files it includes
@@ -20,6 +20,8 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 TIDY = "clang-tidy-14"
+# The static analyzer takes as long as all other checks, and a minute for a test of many cases.
+QUICK = ["--checks=-clang-analyzer-*"]
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
@@ -48,10 +50,10 @@ def fingerprint(entry, files, common):
     return digest.hexdigest()
 
 
-def check(source, build, stamp):
+def check(source, stamp, build, options):
     """What clang-tidy found in a source, or nothing, which the stamp then remembers."""
     result = subprocess.run(
-        [TIDY, "--quiet", "-p", build, source], capture_output=True, text=True
+        [TIDY, "--quiet", *options, "-p", build, source], capture_output=True, text=True
     )
     if result.returncode == 0:
         stamp.touch()
@@ -63,12 +65,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build", type=pathlib.Path, help="folder of a finished Ninja build")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--python", action="store_true", help="check the Python module, too")
+    parser.add_argument("--all", action="store_true",
+                        help="tests, benchmarks and the Python module, too, and the static analyzer")
     arguments = parser.parse_args()
     build = arguments.build.resolve()
 
     version = subprocess.run([TIDY, "--version"], check=True, capture_output=True).stdout
-    common = version + (ROOT / ".clang-tidy").read_bytes()
+    options = [] if arguments.all else QUICK
+    common = version + " ".join(options).encode() + (ROOT / ".clang-tidy").read_bytes()
     files = included_files(build)
     stamps = build / "tidy"
     stamps.mkdir(exist_ok=True)
@@ -78,7 +82,7 @@ def main():
         source = pathlib.Path(entry["file"])
         if not is_ours(source) or source.is_relative_to(build):
             continue
-        if source.is_relative_to(ROOT / "python") and not arguments.python:
+        if not arguments.all and not source.is_relative_to(ROOT / "src"):
             continue
         command = shlex.split(entry["command"])
         output = command[command.index("-o") + 1]
@@ -93,7 +97,7 @@ def main():
         stale.unlink()
 
     with ThreadPoolExecutor(arguments.jobs) as pool:
-        findings = list(pool.map(lambda item: check(item[0], build, item[1]), todo.items()))
+        findings = list(pool.map(lambda item: check(*item, build, options), todo.items()))
     print("".join(findings), end="")
     failed = sum(map(bool, findings))
     print(f"clang-tidy: {len(passed)} unchanged, {len(todo) - failed} passed, {failed} failed")

@@ -43,10 +43,14 @@ class DecisionCounts:
     def wrong(self) -> int: ...
 
 class DecisionOptions:
-    def __init__(self, *, min_score: float = ..., agreement_steps: int = ..., agreement_weight: float = ..., chance_inliers: int = ...) -> None: ...
-    agreement_steps: int
+    def __init__(self, *, min_score: float = ..., full_share: float = ..., full_steps: int = ..., distinctness: bool = ..., chance_evidence: float = ..., agreement_weight: float = ..., agreement_memory: float = ..., count_matches: bool = ...) -> None: ...
+    agreement_memory: float
     agreement_weight: float
-    chance_inliers: int
+    chance_evidence: float
+    count_matches: bool
+    distinctness: bool
+    full_share: float
+    full_steps: int
     min_score: float
 
 class Detection:
@@ -253,6 +257,7 @@ class RetrievalOptions:
 class Status:
     def __eq__(self, other: object) -> bool: ...
     def __init__(self, value: int) -> None: ...
+    ambiguous: ClassVar[Status]
     few_matches: ClassVar[Status]
     loop: ClassVar[Status]
     low_score: ClassVar[Status]
