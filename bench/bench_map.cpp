@@ -108,12 +108,20 @@ class MemoryMap : public loopbit::MapStorage {
   void for_each_earlier_place(const Visit& visit) override {
     for (std::size_t i = 0; i < earlier_; ++i) visit(origins_[i], contents_[i]);
   }
+  void for_each_earlier_loop(const VisitLoop& visit) override {
+    for (const auto& [query, match] : loops_) visit(query, match);
+  }
   std::shared_ptr<const Features> features(PlaceId place) override {
     return features_[static_cast<std::size_t>(place)];
   }
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features) override {
     origins_.push_back({session_, detection.frame});
+    if (detection.status == loopbit::Status::loop) {
+      const auto match = detection.earlier_match.value_or(
+          SessionFrame{session_, detection.match.value_or(detection.frame)});
+      loops_.emplace_back(origins_.back(), match);
+    }
     contents_.push_back(content);
     features_.push_back(std::move(features));
   }
@@ -122,6 +130,7 @@ class MemoryMap : public loopbit::MapStorage {
   int session_ = 1;
   std::size_t earlier_ = 0;
   std::vector<SessionFrame> origins_;
+  std::vector<std::pair<SessionFrame, SessionFrame>> loops_;
   std::vector<BinaryContent> contents_;
   std::vector<std::shared_ptr<const Features>> features_;
 };

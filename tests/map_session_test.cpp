@@ -90,7 +90,7 @@ TEST_F(MapSession, QueriesRankThePlacesOfAllSessions) {
   drive(0, kLap - 1);
   drive(0, kLap - 1, {8, 0});
   const auto map = std::make_shared<MapReader>(path("map.db"));
-  LoopDetector detector(map->options(), map);
+  LoopDetector detector(fast_options(), map);
   std::vector<RankedPlace> places;
   const Detection detection = detector.query(view(7, {8, 1}), std::nullopt, &places);
   EXPECT_EQ(detection.status, Status::loop);
@@ -141,7 +141,7 @@ TEST_F(MapSession, MatchesSupportEachOtherWithinASessionOnly) {
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(one[i].score, two[i].score);
   EXPECT_EQ(two[4].earlier_match, (SessionFrame{2, 0}));
   EXPECT_LT(two[4].score, one[4].score);
-  EXPECT_EQ(two[8].score, one[8].score);
+  EXPECT_GT(two[8].score, two[4].score);
 }
 
 }  // namespace

@@ -96,6 +96,9 @@ class LoopDetector::Impl {
       if (is_step) latest_step = place;
       return is_step;
     });
+    memory_.restore_loops([&](std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
+      known_loops_.add(step, earlier_step);
+    });
   }
 
   /// One frame as the detector sees it: all that remember() needs.

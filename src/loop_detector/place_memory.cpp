@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "place_memory.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace loopbit {
@@ -22,6 +23,15 @@ void PlaceMemory::add_earlier(const SessionFrame& origin, bool is_step) {
     step = last.step + (same_session ? static_cast<int>(is_step) : kStepsBetweenSessions);
   }
   earlier_.push_back({origin, step});
+}
+
+std::optional<PlaceId> PlaceMemory::find(const SessionFrame& origin) const {
+  const auto key = [](const SessionFrame& at) { return std::pair(at.session, at.frame); };
+  const auto found = std::lower_bound(
+      earlier_.begin(), earlier_.end(), key(origin),
+      [&](const EarlierPlace& place, const auto& wanted) { return key(place.origin) < wanted; });
+  if (found == earlier_.end() || !(found->origin == origin)) return std::nullopt;
+  return static_cast<PlaceId>(found - earlier_.begin());
 }
 
 std::ptrdiff_t PlaceMemory::step_of(PlaceId place) const {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "loopbit/map_storage.hpp"
@@ -25,6 +26,17 @@ class PlaceMemory {
     if (!map_) return;
     map_->for_each_earlier_place([&](const SessionFrame& at, const BinaryContent& content) {
       add_earlier(at, visit(content));
+    });
+  }
+
+  /// Calls visit(step, earlier_step) with each loop between places restored.
+  template <typename Visit>
+  void restore_loops(const Visit& visit) {
+    if (!map_) return;
+    map_->for_each_earlier_loop([&](const SessionFrame& query, const SessionFrame& match) {
+      const auto place = find(query);
+      const auto earlier_place = find(match);
+      if (place && earlier_place) visit(step_of(*place), step_of(*earlier_place));
     });
   }
 
@@ -56,6 +68,9 @@ class PlaceMemory {
     SessionFrame origin;
     int step = 0;
   };
+
+  /// The place of an earlier session's frame, if the map still has it.
+  [[nodiscard]] std::optional<PlaceId> find(const SessionFrame& origin) const;
 
   void add_earlier(const SessionFrame& origin, bool is_step);
 

@@ -102,6 +102,10 @@ void MapReader::for_each_earlier_place(const Visit& visit) {
   });
 }
 
+void MapReader::for_each_earlier_loop(const VisitLoop& visit) {
+  for (const MapLoop& loop : loops()) visit(loop.query, loop.match);
+}
+
 std::shared_ptr<const Features> MapReader::features(PlaceId place) {
   return impl_->stored.get(place, impl_->damage);
 }
@@ -135,6 +139,16 @@ class MapWriter::Impl {
           visit(place.at, place.content);
         },
         damage_);
+    refuse_damage();
+  }
+
+  void for_each_earlier_loop(const VisitLoop& visit) {
+    (void)stored();  // not after finish()
+    for (const MapLoop& loop : read_loops(*database_, damage_)) visit(loop.query, loop.match);
+    refuse_damage();
+  }
+
+  void refuse_damage() const {
     if (damage_.clauses().empty()) return;
     throw Error(ErrorKind::input,
                 fmt::format("'{0}' is damaged ({1}) and not written to; 'loopbit map check {0} "
@@ -221,6 +235,9 @@ void MapWriter::flush() { impl_->writer().flush(); }
 void MapWriter::finish() { impl_->finish(); }
 
 void MapWriter::for_each_earlier_place(const Visit& visit) { impl_->for_each_earlier_place(visit); }
+void MapWriter::for_each_earlier_loop(const VisitLoop& visit) {
+  impl_->for_each_earlier_loop(visit);
+}
 
 std::shared_ptr<const Features> MapWriter::features(PlaceId place) {
   return impl_->features(place);

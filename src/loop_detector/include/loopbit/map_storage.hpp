@@ -18,6 +18,7 @@ namespace loopbit {
 class MapStorage {
  public:
   using Visit = std::function<void(const SessionFrame&, const BinaryContent&)>;
+  using VisitLoop = std::function<void(const SessionFrame& query, const SessionFrame& match)>;
 
   MapStorage() = default;
   virtual ~MapStorage() = default;
@@ -28,6 +29,9 @@ class MapStorage {
 
   /// Calls back with each place of earlier sessions, in order.
   virtual void for_each_earlier_place(const Visit& visit) = 0;
+
+  /// Calls back with each loop of earlier sessions, in the order in which they were found.
+  virtual void for_each_earlier_loop(const VisitLoop& visit) = 0;
 
   /// The features of a place; without any if they are lost. Never null.
   virtual std::shared_ptr<const Features> features(PlaceId place) = 0;

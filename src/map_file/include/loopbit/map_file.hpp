@@ -95,6 +95,7 @@ class MapReader : public MapStorage {
 
   // For LoopDetector::query; add() throws Error (kind option).
   void for_each_earlier_place(const Visit& visit) override;
+  void for_each_earlier_loop(const VisitLoop& visit) override;
   std::shared_ptr<const Features> features(PlaceId place) override;
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features) override;
@@ -140,6 +141,7 @@ class MapWriter : public MapStorage {
 
   /// Throws Error (kind input) where a place is damaged: a damaged map is not written to.
   void for_each_earlier_place(const Visit& visit) override;
+  void for_each_earlier_loop(const VisitLoop& visit) override;
   std::shared_ptr<const Features> features(PlaceId place) override;
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features) override;
