@@ -83,6 +83,13 @@ TEST(RealImages, HeadWornCameraHasNoWrongLoop) {
   EXPECT_GE(counts.recall(), 0.10);
 }
 
+TEST(RealImages, LookAlikeDoorsBehindALensRimAreNoLoops) {
+  LOOPBIT_NEEDS_DATA("lateral_corridor");
+  const auto counts = score("lateral_corridor", "lateral_corridor/images",
+                            read_truth("lateral_corridor/truth.csv"));
+  EXPECT_EQ(counts.wrong, 0);
+}
+
 TEST(RealImages, StandingStillIsNoRevisit) {
   LOOPBIT_NEEDS_DATA("office_tour");
   const auto source = open_source((*test::data_dir() / "office_tour/images").string());

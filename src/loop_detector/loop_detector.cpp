@@ -29,6 +29,9 @@ namespace {
 constexpr double kUnmovedSimilarity = 0.8;
 /// Different places share a few inliers by chance; with so many they share a thing.
 constexpr int kMinSightingInliers = 8;
+/// Half of the matches of different places fit their geometry at best: with fewer, none is sought
+/// to see what they share.
+constexpr int kMinSightingMatches = 2 * kMinSightingInliers;
 
 class Stopwatch {
  public:
@@ -316,7 +319,10 @@ class LoopDetector::Impl {
     double best = 0;
     bool is_promising = false;
     for (const auto& [negative_bound, i] : order) {
-      if (-negative_bound < best && !is_promising) break;
+      if (-negative_bound < best) {
+        if (!is_promising) break;
+        if (seen.verified[i].matches < kMinSightingMatches) continue;
+      }
       find_geometry(seen, seen.verified[i], verifications_[i]);
       best = std::max(best, agreement_.score(seen.verified[i], seen.look.is_step));
       is_promising |= seen.verified[i].evidence() > options_.decision.chance_evidence;

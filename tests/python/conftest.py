@@ -80,7 +80,7 @@ def as_row(detection):
         "timestamp": "" if detection.timestamp_s is None else f"{detection.timestamp_s:.6f}",
         "status": detection.status.name,
         "match": "" if detection.match is None else str(detection.match),
-        "score": f"{detection.score:g}",
+        "score": repr(detection.score).removesuffix(".0"),
         "similarity": f"{detection.similarity:.6f}",
         "matches": str(detection.matches),
         "inliers": str(detection.inliers),
