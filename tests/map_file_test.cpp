@@ -39,7 +39,9 @@ TEST_F(MapFile, GivesBackWhatWasAdded) {
   EXPECT_EQ(map.sessions()[0].name, "drive");
   EXPECT_EQ(map.sessions()[0].frames, 40);
   EXPECT_EQ(map.sessions()[0].uid.size(), 32U);
-  EXPECT_EQ(to_json(map.options()), to_json(fast_options()));
+  LoopDetectorOptions of_shape;  // a map fixes what its places are made of, not the decision
+  of_shape.surf = fast_options().surf;
+  EXPECT_EQ(to_json(map.options()), to_json(of_shape));
   EXPECT_TRUE(map.damage().empty());
   EXPECT_TRUE(map.check_structure().empty());
 }
