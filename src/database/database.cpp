@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/database.hpp"
 
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -139,6 +141,11 @@ std::span<const unsigned char> Statement::bytes(int column) const {
       static_cast<const unsigned char*>(sqlite3_column_blob(statement_.get(), column));
   const int size = sqlite3_column_bytes(statement_.get(), column);
   return data ? std::span(data, static_cast<std::size_t>(size)) : std::span<const unsigned char>{};
+}
+
+void remove_database(const std::string& path) {
+  std::error_code ignored;
+  for (const char* suffix : kDatabaseSuffixes) std::filesystem::remove(path + suffix, ignored);
 }
 
 }  // namespace loopbit

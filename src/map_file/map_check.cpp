@@ -56,10 +56,7 @@ std::vector<MapSession> all_sessions(MapReader& map) {
 class RepairedCopy {
  public:
   explicit RepairedCopy(std::string path) : path_(std::move(path)) {}
-  ~RepairedCopy() {
-    std::error_code error;
-    for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(path_ + suffix, error);
-  }
+  ~RepairedCopy() { remove_database(path_); }
   RepairedCopy(const RepairedCopy&) = delete;
   RepairedCopy& operator=(const RepairedCopy&) = delete;
   RepairedCopy(RepairedCopy&&) = delete;

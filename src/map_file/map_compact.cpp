@@ -91,7 +91,7 @@ void write_compact(const std::string& path, const std::string& part, const Compa
   counts.places_after = copy_whole(map, sessions, compact, [&](const MapPlace& place) {
                           return kept.contains(place.id);
                         }).places;
-  refuse_damaged(map);
+  refuse_damaged(map.path(), map.damage());
   keep_sequences(old, compact);
   close_log(compact);
 }
@@ -111,17 +111,13 @@ void check_unused(const std::string& path) {
 CompactCounts compact_map(const std::string& path, const CompactOptions& options) {
   const WriterLock lock(path);
   const std::string part = path + ".compact";
-  const auto remove_part = [&] {
-    std::error_code error;
-    for (const char* suffix : {"", "-wal", "-shm"}) fs::remove(part + suffix, error);
-  };
-  remove_part();
+  remove_database(part);
   CompactCounts counts;
   try {
     write_compact(path, part, options, counts);
     check_unused(path);
   } catch (const Error&) {
-    remove_part();
+    remove_database(part);
     throw;
   }
   counts.bytes_before = fs::file_size(path);

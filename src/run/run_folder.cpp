@@ -15,6 +15,7 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
+#include "loopbit/database.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/kernels.hpp"
 #include "loopbit/version.hpp"
@@ -32,7 +33,7 @@ using Json = nlohmann::ordered_json;
 std::vector<std::string> files_of_a_run() {
   std::vector<std::string> names{kLoopsFile,  kRecordFile,    kTruthFile, kNotFalseFile,
                                  kIgnoreFile, kPositionsFile, kReportFile};
-  for (const char* suffix : {"", "-wal", "-shm"}) {
+  for (const char* suffix : kDatabaseSuffixes) {
     names.push_back(std::string(kEvidenceFile) + suffix);
   }
   return names;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -12,6 +13,12 @@ struct sqlite3;
 struct sqlite3_stmt;
 
 namespace loopbit {
+
+/// SQLite keeps a database in a file and, while it is written or after a crash, in those beside it.
+inline constexpr std::array kDatabaseSuffixes{"", "-wal", "-shm"};
+
+/// Removes those files; what cannot be removed stays.
+void remove_database(const std::string& path);
 
 /// A SQLite file. Every failure is an Error that names the file and a remedy; its kind is output
 /// where something could not be written, else input. What a file says is never trusted: a hostile
