@@ -4,10 +4,6 @@
 
 #include <utility>
 
-#include <fmt/format.h>
-
-#include "loopbit/error.hpp"
-
 namespace loopbit {
 namespace {
 
@@ -61,14 +57,6 @@ MapCheck copy_whole(MapReader& from, const std::vector<MapSession>& sessions, co
   for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);
   to.execute("COMMIT");
   return counts;
-}
-
-void refuse_damaged(const MapReader& map) {
-  if (map.damage().empty()) return;
-  throw Error(ErrorKind::input,
-              fmt::format("'{0}' is damaged ({1}, {2} in all); 'loopbit map check {0} --recover "
-                          "NEW.db' saves the rest in a new map first.",
-                          map.path(), map.damage().front(), map.damage().size()));
 }
 
 }  // namespace loopbit

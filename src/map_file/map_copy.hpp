@@ -39,7 +39,4 @@ class MapCopy {
 MapCheck copy_whole(MapReader& from, const std::vector<MapSession>& sessions, const Database& to,
                     const std::function<bool(const MapPlace&)>& keeps);
 
-/// Throws Error (kind input) if something damaged was found so far.
-void refuse_damaged(const MapReader& map);
-
 }  // namespace loopbit

@@ -35,11 +35,6 @@ std::string now_utc() {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
-std::string with_more(const std::vector<std::string>& damage) {
-  const std::size_t more = damage.size() - 1;
-  return damage.front() + (more > 0 ? fmt::format(", and {} more", more) : "");
-}
-
 }  // namespace
 
 struct MapReader::Impl {
@@ -139,21 +134,13 @@ class MapWriter::Impl {
           visit(place.at, place.content);
         },
         damage_);
-    refuse_damage();
+    refuse_damaged(database_->path(), damage_.clauses());
   }
 
   void for_each_earlier_loop(const VisitLoop& visit) {
     (void)stored();  // not after finish()
     for (const MapLoop& loop : read_loops(*database_, damage_)) visit(loop.query, loop.match);
-    refuse_damage();
-  }
-
-  void refuse_damage() const {
-    if (damage_.clauses().empty()) return;
-    throw Error(ErrorKind::input,
-                fmt::format("'{0}' is damaged ({1}) and not written to; 'loopbit map check {0} "
-                            "--recover NEW.db' saves the rest in a new map.",
-                            database_->path(), with_more(damage_.clauses())));
+    refuse_damaged(database_->path(), damage_.clauses());
   }
 
   std::shared_ptr<const Features> features(PlaceId place) {

@@ -74,7 +74,7 @@ MergeCounts merge_map(const std::string& into, const std::string& from) {
   for (const MapLoop& loop : source.loops()) {
     if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
   }
-  refuse_damaged(source);  // which leaves the transaction: nothing is copied
+  refuse_damaged(source.path(), source.damage());  // leaves the transaction
   to.execute("COMMIT");
   close_log(to);
   return counts;

@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "loopbit/error.hpp"
+
 #include "row_codec.hpp"
 
 namespace loopbit {
@@ -99,6 +101,16 @@ SessionFrame session_frame(const Statement& row, int column) {
 }
 
 }  // namespace
+
+void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses) {
+  if (clauses.empty()) return;
+  const std::size_t more = clauses.size() - 1;
+  throw Error(
+      ErrorKind::input,
+      fmt::format("'{0}' is damaged ({1}{2}), and is left as it is; 'loopbit map check {0} "
+                  "--recover NEW.db' saves the rest in a new map.",
+                  path, clauses.front(), more > 0 ? fmt::format(", and {} more", more) : ""));
+}
 
 std::vector<MapSession> read_sessions(const Database& database, Damage& damage) {
   std::vector<MapSession> sessions;

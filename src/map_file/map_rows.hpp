@@ -31,6 +31,10 @@ class Damage {
   std::unordered_set<std::string> known_;
 };
 
+/// Throws Error (kind input) if there are `clauses`: no map is written to or copied from while
+/// damaged.
+void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);
+
 std::vector<MapSession> read_sessions(const Database& database, Damage& damage);
 
 /// In order of id.
