@@ -18,6 +18,7 @@ constexpr std::ptrdiff_t kMaxStepsPerStep = 3;
 
 double inlier_worth(double explained_share, std::ptrdiff_t earlier_steps,
                     const DecisionOptions& options) {
+  if (options.count_matches) return 1;
   double worth = 1;
   if (explained_share < options.full_share) worth = std::sqrt(explained_share / options.full_share);
   if (earlier_steps < options.full_steps) {

@@ -26,7 +26,7 @@ struct VerifiedCandidate {
 
 /// What one distinct inlier counts, 0 to 1. `explained_share`: see there. `earlier_steps`: changes
 /// of view that the map holds: how rare a thing is can be known no better than by one in so many,
-/// so that evidence counts less while a map is small.
+/// so that evidence counts less while a map is small. 1 where mere matches are counted.
 double inlier_worth(double explained_share, std::ptrdiff_t earlier_steps,
                     const DecisionOptions& options);
 

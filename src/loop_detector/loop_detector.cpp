@@ -112,6 +112,7 @@ class LoopDetector::Impl {
     RecentView::Look look;
     std::ptrdiff_t earlier_steps = 0;  ///< that may be candidates
     std::vector<VerifiedCandidate> verified;
+    std::vector<Sighting> sightings;        ///< none if no candidate is promising
     std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
   };
 
@@ -164,6 +165,7 @@ class LoopDetector::Impl {
   /// How each candidate scored, in the order in which decide() ranks them.
   [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen) const {
     for (std::size_t i = 0; i < seen.verified.size(); ++i) {
+      if (seen.verified[i].inliers > 0) continue;
       find_geometry(seen, seen.verified[i], verifications_[i]);
     }
     if (seen.best) {
@@ -328,9 +330,9 @@ class LoopDetector::Impl {
       is_promising |= seen.verified[i].evidence() > options_.decision.chance_evidence;
     }
     if (!is_promising || !options_.decision.distinctness) return;
-    const std::vector<Sighting> others = sightings(seen);
+    seen.sightings = sightings(seen);
     for (std::size_t i = 0; i < seen.verified.size(); ++i) {
-      find_distinctness(others, seen.verified[i], verifications_[i]);
+      find_distinctness(seen.sightings, seen.verified[i], verifications_[i]);
     }
   }
 
@@ -380,7 +382,6 @@ class LoopDetector::Impl {
     const auto closeness = [](const VerifiedCandidate& v) {
       return std::tuple(v.distinct_inliers, v.inliers, v.candidate.similarity);
     };
-    const std::vector<Sighting> others = sightings(seen);
     const PlaceId middle = candidate.candidate.place;
     const int radius = options_.retrieval.min_spacing;
     VerifiedCandidate best = candidate;
@@ -393,7 +394,7 @@ class LoopDetector::Impl {
       if (neighbour.matches < best.distinct_inliers) continue;
       find_geometry(seen, neighbour, verification_);
       if (closeness(neighbour) <= closeness(best)) continue;
-      if (options_.decision.distinctness) find_distinctness(others, neighbour, verification_);
+      find_distinctness(seen.sightings, neighbour, verification_);
       best = neighbour;
     }
     return best;
