@@ -4,41 +4,20 @@
 // fundamental matrix, each frame alone. Its score is the number of inliers.
 //
 //   orb_baseline INPUT > loops.csv
-#include <algorithm>
 #include <cstdio>
 #include <exception>
 #include <vector>
 
 #include <fmt/core.h>
-#include <opencv2/imgproc.hpp>
 
 #include "loopbit/gray_image.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
-#include "loopbit/verification.hpp"
 
 #include "orb_matching.hpp"
 
 namespace loopbit::bench {
 namespace {
-
-constexpr int kKeypoints = 1000;
-
-int inliers(const OrbFeatures& query, const OrbFeatures& place) {
-  const double error_px = VerificationOptions().max_epipolar_error_px;
-  return static_cast<int>(
-      epipolar_inliers(positions_of(query), positions_of(place), match_orb(query, place), error_px)
-          .size());
-}
-
-/// As SURF has it: at the working size.
-cv::Mat1b working_image(const cv::Mat1b& gray) {
-  const double scale =
-      static_cast<double>(SurfOptions().working_side_px) / std::max(gray.cols, gray.rows);
-  cv::Mat1b scaled;
-  cv::resize(gray, scaled, {}, scale, scale, scale < 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
-  return scaled;
-}
 
 void detect(const char* input) {
   const auto source = open_source(input);
@@ -47,14 +26,14 @@ void detect(const char* input) {
   std::vector<RankedPlace> candidates;
   fmt::print("frame,status,match,score\n");
   for (Frame frame; source->next(frame);) {
-    places.push_back(orb(working_image(gray_image(frame.image)), kKeypoints));
+    places.push_back(orb(working_image(gray_image(frame.image))));
     static_cast<void>(detector.query(frame.image, frame.timestamp_s, &candidates));
     const Detection detection = detector.process(frame.image, frame.timestamp_s);
     int best = 0;
     int match = -1;
     for (const RankedPlace& candidate : candidates) {
-      const int found =
-          inliers(places.back(), places[static_cast<std::size_t>(candidate.place.frame)]);
+      const OrbFeatures& place = places[static_cast<std::size_t>(candidate.place.frame)];
+      const int found = static_cast<int>(orb_inliers(places.back(), place).size());
       if (found <= best) continue;
       best = found;
       match = candidate.place.frame;

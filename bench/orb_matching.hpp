@@ -11,17 +11,21 @@
 
 namespace loopbit::bench {
 
+/// What ORB has to be compared with: 1000 keypoints.
+inline constexpr int kOrbKeypoints = 1000;
+
+/// The image at the size at which SURF looks at it.
+cv::Mat1b working_image(const cv::Mat1b& gray);
+
 /// OpenCV's ORB with its defaults but for the number of keypoints.
 struct OrbFeatures {
-  std::vector<cv::KeyPoint> keypoints;
+  Features positions;  ///< without descriptors of their own, for the geometry
   cv::Mat descriptors;
 };
-OrbFeatures orb(const cv::Mat1b& gray, int max_keypoints);
+OrbFeatures orb(const cv::Mat1b& gray);
 
-/// Mutual matches that pass the ratio test from either side, as match_features has them.
-std::vector<Match> match_orb(const OrbFeatures& a, const OrbFeatures& b);
-
-/// Features without descriptors, for their geometry.
-Features positions_of(const OrbFeatures& orb);
+/// Mutual matches that pass the ratio test from either side, as match_features has them, and that
+/// one epipolar geometry explains.
+std::vector<Match> orb_inliers(const OrbFeatures& a, const OrbFeatures& b);
 
 }  // namespace loopbit::bench

@@ -12,7 +12,6 @@
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
@@ -25,9 +24,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kWorkingSide = 640;
-constexpr int kOrbKeypoints = 1000;
-
 /// What one method makes of two images.
 struct Outcome {
   std::vector<cv::Point2f> first;
@@ -36,14 +32,7 @@ struct Outcome {
 };
 using Method = std::function<Outcome(const cv::Mat1b&, const cv::Mat1b&, bool upright)>;
 
-cv::Mat1b read(const fs::path& path) {
-  const cv::Mat1b image = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
-  const double factor = static_cast<double>(kWorkingSide) / std::max(image.cols, image.rows);
-  cv::Mat resized;
-  cv::resize(image, resized, {cvRound(image.cols * factor), cvRound(image.rows * factor)}, 0, 0,
-             cv::INTER_AREA);
-  return resized;
-}
+cv::Mat1b read(const fs::path& path) { return cv::imread(path.string(), cv::IMREAD_GRAYSCALE); }
 
 std::vector<cv::Point2f> points_of(const Features& features) {
   std::vector<cv::Point2f> points;
@@ -70,12 +59,9 @@ Outcome dlibs(const cv::Mat1b& a, const cv::Mat1b& b, bool upright) {
 }
 
 Outcome orbs(const cv::Mat1b& a, const cv::Mat1b& b, bool /*upright*/) {
-  const OrbFeatures of_a = orb(a, kOrbKeypoints);
-  const OrbFeatures of_b = orb(b, kOrbKeypoints);
-  const Features at_a = positions_of(of_a);
-  const Features at_b = positions_of(of_b);
-  return {points_of(at_a), points_of(at_b),
-          epipolar_inliers(at_a, at_b, match_orb(of_a, of_b), 2.0).size()};
+  const OrbFeatures of_a = orb(a);
+  const OrbFeatures of_b = orb(b);
+  return {points_of(of_a.positions), points_of(of_b.positions), orb_inliers(of_a, of_b).size()};
 }
 
 struct Case {
@@ -164,12 +150,12 @@ std::string measure(const Case& pairs, const Method& method) {
   double inliers = 0;
   double repeated = 0;
   for (const auto& [a, b] : pairs.pairs) {
-    const cv::Mat1b first = read(a);
-    const Outcome outcome = method(first, read(b), pairs.upright);
+    const cv::Mat1b image = read(a);
+    const cv::Mat1b first = working_image(image);
+    const Outcome outcome = method(first, working_image(read(b)), pairs.upright);
     inliers += static_cast<double>(outcome.inliers);
     if (pairs.homography) {
-      const double side = std::max(cv::imread(a.string()).cols, cv::imread(a.string()).rows);
-      const double factor = kWorkingSide / side;
+      const double factor = static_cast<double>(first.cols) / image.cols;
       const cv::Matx33d scale = cv::Matx33d::diag({factor, factor, 1.0});
       repeated = repeatability(outcome, scale * *pairs.homography * scale.inv(), first.size());
     }
