@@ -97,8 +97,7 @@ void print_parts(const cv::Mat1b& image, const Machine& machine) {
     maxima.clear();
     pyramid.find_maxima(1.0F, kernels, maxima);
   });
-  const Features features =
-      extract_surf(image, {.working_side_px = std::max(image.cols, image.rows)});
+  const Features features = extract_surf(image, {.working_area_px = image.cols * image.rows});
   Patch patch{};
   Descriptor descriptor{};
   const double patches_ms = median_ms(99, [&] {
@@ -136,7 +135,7 @@ double surf_speedup(const std::vector<cv::Mat1b>& images) {
   std::vector<double> peer_all;
   std::vector<double> ratios;
   for (const cv::Mat1b& image : images) {
-    SurfOptions options{.working_side_px = std::max(image.cols, image.rows)};
+    SurfOptions options{.working_area_px = image.cols * image.rows};
     const auto count = [&](const Features& f) { return static_cast<int>(f.keypoints.size()); };
     // As many as the one that finds fewer; it may be a little short of its own budget again.
     options.max_keypoints = std::min(count(extract_surf(image, options)),

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "orb_matching.hpp"
 
-#include <algorithm>
+#include <cmath>
 
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -34,7 +34,7 @@ std::vector<Match> matches(const cv::Mat& a, const cv::Mat& b) {
 
 cv::Mat1b working_image(const cv::Mat1b& gray) {
   const double scale =
-      static_cast<double>(SurfOptions().working_side_px) / std::max(gray.cols, gray.rows);
+      std::sqrt(SurfOptions().working_area_px / (static_cast<double>(gray.cols) * gray.rows));
   cv::Mat1b scaled;
   cv::resize(gray, scaled, {}, scale, scale, scale < 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
   return scaled;

@@ -22,7 +22,7 @@ constexpr int kLap = 24;
 /// full_steps, as the maps are.
 LoopDetectorOptions fast_options() {
   LoopDetectorOptions options;
-  options.surf = {.working_side_px = 320, .max_keypoints = 300};
+  options.surf = {.working_area_px = 320 * 240, .max_keypoints = 300};
   options.decision.full_steps = 1;
   return options;
 }

@@ -47,7 +47,7 @@ TEST(SteadyState, CountsAllocations) {
 
 TEST(SteadyState, FeaturesOfImagesOfOneSizeAllocateNothing) {
   for (const bool upright : {true, false}) {
-    SurfExtractor extractor({.working_side_px = 320, .upright = upright});
+    SurfExtractor extractor({.working_area_px = 320 * 240, .upright = upright});
     Features features;
     const cv::Mat1b images[] = {view(1), view(2), view(3)};
     for (const cv::Mat1b& image : images) extractor.extract(image, features);

@@ -21,7 +21,7 @@ namespace {
 
 /// Features in the pixels of `gray` itself.
 Features extract_unscaled(const cv::Mat1b& gray, int max_keypoints = 400, bool upright = true) {
-  return extract_surf(gray, {.working_side_px = std::max(gray.cols, gray.rows),
+  return extract_surf(gray, {.working_area_px = gray.cols * gray.rows,
                              .max_keypoints = max_keypoints,
                              .upright = upright});
 }
@@ -97,8 +97,7 @@ TEST(Surf, EveryKernelFindsTheSameFeatures) {
                               cv::Size(640, 97), cv::Size(64, 64), cv::Size(65, 47)}) {
     const cv::Mat1b gray = textured_image(size, size.width);
     for (const bool upright : {true, false}) {
-      const SurfOptions options{.working_side_px = std::max(size.width, size.height),
-                                .upright = upright};
+      const SurfOptions options{.working_area_px = size.area(), .upright = upright};
       const Features expected = extract_with(*available_kernels().front(), gray, options);
       for (const Kernels* kernels : available_kernels()) {
         SCOPED_TRACE(std::string(kernels->name));
@@ -220,20 +219,19 @@ TEST(Surf, SmallerBudgetKeepsTheStrongestOfEachSign) {
 }
 
 TEST(Surf, KeypointsAreInPixelsOfTheWorkingImage) {
-  for (const int working_side_px : {480, 120}) {
-    const Features features =
-        extract_surf(disc_image(200, 50), {.working_side_px = working_side_px});
-    const double factor = working_side_px / 240.0;
-    EXPECT_EQ(features.working_size_px, cv::Size(working_side_px, working_side_px * 160 / 240));
+  for (const cv::Size size : {cv::Size(480, 320), cv::Size(120, 80)}) {
+    const Features features = extract_surf(disc_image(200, 50), {.working_area_px = size.area()});
+    const double factor = size.width / 240.0;
+    EXPECT_EQ(features.working_size_px, size);
     ASSERT_GT(features.num_dark, 0U);
     EXPECT_NEAR(features.keypoints.front().x_px, 100 * factor, 1.5 * factor);
     EXPECT_NEAR(features.keypoints.front().y_px, 60 * factor, 1.5 * factor);
   }
 }
 
-TEST(Surf, LongerSideDecidesTheWorkingSize) {
-  EXPECT_EQ(extract_surf(textured_image({1242, 375}, 1)).working_size_px, cv::Size(640, 193));
-  EXPECT_EQ(extract_surf(textured_image({375, 1242}, 1)).working_size_px, cv::Size(193, 640));
+TEST(Surf, ImagesOfAllShapesAreScaledToTheSameArea) {
+  EXPECT_EQ(extract_surf(textured_image({1242, 375}, 1)).working_size_px, cv::Size(1009, 305));
+  EXPECT_EQ(extract_surf(textured_image({375, 1242}, 1)).working_size_px, cv::Size(305, 1009));
   EXPECT_EQ(extract_surf(textured_image({160, 120}, 1)).working_size_px, cv::Size(640, 480));
 }
 
@@ -252,7 +250,7 @@ TEST(Surf, SameSceneInAnotherSizeMatches) {
 TEST(Surf, ScalingDownAveragesNoise) {
   Random random;
   const cv::Mat1b clean = textured_image({1280, 960}, 6);
-  const SurfOptions quarter{.working_side_px = 320, .max_keypoints = 200};
+  const SurfOptions quarter{.working_area_px = 320 * 240, .max_keypoints = 200};
   const Features place = extract_surf(clean, quarter);
   const Features query = extract_surf(with_noise(clean, 40.0, random), quarter);
   EXPECT_GT(count_right(query, place, match_features(query, place, 0.8), 2.0,
@@ -273,7 +271,7 @@ TEST(Surf, SmallestAndNarrowestImagesAreFine) {
        {cv::Size(32, 32), cv::Size(32, 33), cv::Size(4000, 32), cv::Size(32, 4000)}) {
     SCOPED_TRACE(size);
     expect_consistent(extract_surf(textured_image(size, 7)));
-    expect_consistent(extract_surf(textured_image(size, 7), {.working_side_px = 64}));
+    expect_consistent(extract_surf(textured_image(size, 7), {.working_area_px = 64 * 64}));
   }
 }
 

@@ -129,7 +129,7 @@ TEST(MatchFeatures, AgreesWithPlainLoopsOnSmallGroups) {
 }
 
 TEST(MatchFeatures, AgreesWithPlainLoopsOnImages) {
-  const SurfOptions options{.working_side_px = 320, .max_keypoints = 250};
+  const SurfOptions options{.working_area_px = 320 * 240, .max_keypoints = 250};
   expect_as_plain_loops(extract_surf(view(1), options), extract_surf(view(1, {9, 4}), options));
 }
 

@@ -18,6 +18,8 @@ namespace {
 
 /// In squared grey levels: below, the 8 bits of a pixel are too coarse to tell a blob.
 constexpr float kMinResponse = 1.0F;
+/// However narrow an image is, its longer side is scaled to no more than this.
+constexpr double kMaxSide_px = 16384;
 /// The grid's cells are about this wide and high, at least one.
 constexpr int kGridCellPx = 80;
 /// A cell may hold this many times its share of the budget.
@@ -54,8 +56,9 @@ class SurfExtractor::Impl {
 
  private:
   const cv::Mat1b& working_image(const cv::Mat1b& gray) {
-    const double factor =
-        static_cast<double>(options_.working_side_px) / std::max(gray.cols, gray.rows);
+    const double area = static_cast<double>(gray.cols) * gray.rows;
+    const double factor = std::min(std::sqrt(options_.working_area_px / area),
+                                   kMaxSide_px / std::max(gray.cols, gray.rows));
     const cv::Size size(std::max(1, cvRound(gray.cols * factor)),
                         std::max(1, cvRound(gray.rows * factor)));
     if (size == gray.size()) return gray;

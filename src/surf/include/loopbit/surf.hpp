@@ -16,7 +16,7 @@
 
 namespace loopbit {
 
-/// A SURF keypoint in pixels of the working image (see SurfOptions::working_side_px).
+/// A SURF keypoint in pixels of the working image (see SurfOptions::working_area_px).
 struct Keypoint {
   float x_px = 0;
   float y_px = 0;
@@ -37,16 +37,15 @@ struct Features {
 };
 
 struct SurfOptions {
-  int working_side_px = 640;
+  int working_area_px = 640 * 480;
   int max_keypoints = 600;
   bool upright = true;
 
   static constexpr auto fields() {
     using S = SurfOptions;
     return std::tuple{
-        Field{
-            "working_side_px", &S::working_side_px, 64, 4096,
-            "images are scaled up or down to this longer side before features are sought, pixels"},
+        Field{"working_area_px", &S::working_area_px, 64 * 64, 4096 * 4096,
+              "images are scaled up or down to about so many pixels before features are sought"},
         Field{"max_keypoints", &S::max_keypoints, 50, 10000,
               "strongest keypoints kept of an image"},
         switch_field("upright", &S::upright,
