@@ -20,6 +20,9 @@ namespace {
 constexpr float kMinResponse = 1.0F;
 /// However narrow an image is, its longer side is scaled to no more than this.
 constexpr double kMaxSide_px = 16384;
+/// Down to this factor, linear interpolation takes every pixel into account; it is five times
+/// faster than averaging areas.
+constexpr double kLeastLinearFactor = 0.5;
 /// The grid's cells are about this wide and high, at least one.
 constexpr int kGridCellPx = 80;
 /// A cell may hold this many times its share of the budget.
@@ -62,7 +65,9 @@ class SurfExtractor::Impl {
     const cv::Size size(std::max(1, cvRound(gray.cols * factor)),
                         std::max(1, cvRound(gray.rows * factor)));
     if (size == gray.size()) return gray;
-    cv::resize(gray, working_, size, 0, 0, factor < 1 ? cv::INTER_AREA : cv::INTER_LINEAR_EXACT);
+    const bool skips_pixels = factor < kLeastLinearFactor;
+    cv::resize(gray, working_, size, 0, 0,
+               skips_pixels ? cv::INTER_AREA : cv::INTER_LINEAR_EXACT);
     return working_;
   }
 
