@@ -29,10 +29,6 @@ namespace {
 constexpr double kUnmovedSimilarity = 0.8;
 /// Different places share a few inliers by chance; with so many they share a thing.
 constexpr int kMinSightingInliers = 8;
-/// Half of the matches of different places fit their geometry at best: with fewer, none is sought
-/// to see what they share.
-constexpr int kMinSightingMatches = 2 * kMinSightingInliers;
-
 class Stopwatch {
  public:
   double lap_ms() {
@@ -305,10 +301,18 @@ class LoopDetector::Impl {
         {candidate.step, known_loops_.first_visit(candidate.step), result.inliers}, others);
   }
 
-  /// Matches all candidates, which is cheap, and seeks the geometry of the most promising first,
-  /// until none of the others can have a higher score than the best. If one has more evidence than
-  /// chance gives, the others are verified all the same, to see which inliers they share. Those
-  /// left out keep no inliers: they change nothing now, and support no later match.
+  /// Of `matches`, those whose feature of the query is an inlier of a promising candidate.
+  [[nodiscard]] std::ptrdiff_t num_shared(const std::vector<Match>& matches) const {
+    return std::count_if(matches.begin(), matches.end(), [&](const Match& match) {
+      return is_promising_[static_cast<std::size_t>(match.query)];
+    });
+  }
+
+  /// Matches all candidates, which is cheap, and seeks the geometry of those with the most matches
+  /// first, until none of the others can have a higher score than the best. A candidate with more
+  /// evidence than chance gives is promising; then others that may have what it has are verified
+  /// all the same, to see how much of it they share. Those left out keep no inliers: they change
+  /// nothing now, and support no later match.
   void verify_candidates(const std::vector<Candidate>& candidates, Observation& seen) const {
     verifications_.resize(std::max(verifications_.size(), candidates.size()));
     std::vector<std::pair<double, std::size_t>> order;
@@ -319,17 +323,20 @@ class LoopDetector::Impl {
     }
     std::sort(order.begin(), order.end());
     double best = 0;
-    bool is_promising = false;
+    bool any_promising = false;
+    is_promising_.assign(seen.features.keypoints.size(), false);
     for (const auto& [negative_bound, i] : order) {
-      if (-negative_bound < best) {
-        if (!is_promising) break;
-        if (seen.verified[i].matches < kMinSightingMatches) continue;
-      }
+      const bool may_win = -negative_bound >= best;
+      if (!may_win && num_shared(verifications_[i].matches) < kMinSightingInliers) continue;
       find_geometry(seen, seen.verified[i], verifications_[i]);
       best = std::max(best, agreement_.score(seen.verified[i], seen.look.is_step));
-      is_promising |= seen.verified[i].evidence() > options_.decision.chance_evidence;
+      if (seen.verified[i].evidence() <= options_.decision.chance_evidence) continue;
+      any_promising = true;
+      for (const Match& inlier : verifications_[i].inliers) {
+        is_promising_[static_cast<std::size_t>(inlier.query)] = true;
+      }
     }
-    if (!is_promising || !options_.decision.distinctness) return;
+    if (!any_promising || !options_.decision.distinctness) return;
     seen.sightings = sightings(seen);
     for (std::size_t i = 0; i < seen.verified.size(); ++i) {
       find_distinctness(seen.sightings, seen.verified[i], verifications_[i]);
@@ -444,6 +451,7 @@ class LoopDetector::Impl {
   mutable SurfExtractor surf_;
   mutable Verifier verifier_;
   mutable std::vector<Verification> verifications_;  ///< of the candidates of one frame
+  mutable std::vector<bool> is_promising_;           ///< by feature of it, see num_shared()
   mutable Verification verification_;                ///< of one other place
 };
 
