@@ -73,7 +73,7 @@ void make_map(const std::string& path, int places) {
   const auto shared = std::make_shared<const Features>(std::move(features));
   Drift drift;
   for (PlaceId frame = 0; frame < places; ++frame) {
-    map.add({.frame = frame}, drift.next(), shared);
+    map.add({.frame = frame}, drift.next(), shared, cv::Mat());
   }
   map.finish();
 }
@@ -115,7 +115,7 @@ class MemoryMap : public loopbit::MapStorage {
     return features_[static_cast<std::size_t>(place)];
   }
   void add(const Detection& detection, const BinaryContent& content,
-           std::shared_ptr<const Features> features) override {
+           std::shared_ptr<const Features> features, const cv::Mat& /*image*/) override {
     origins_.push_back({session_, detection.frame});
     if (detection.status == loopbit::Status::loop) {
       const auto match = detection.earlier_match.value_or(
