@@ -182,13 +182,19 @@ TEST_F(MapImagesTest, AMapOfVersion1IsContinuedWithImages) {
 }
 
 TEST_F(MapImagesTest, AMapOfVersion1IsRecoveredWithoutItsFirstPage) {
-  std::string bytes = read_bytes(LOOPBIT_OLD_MAP);
-  const auto places = static_cast<std::int64_t>(places_of(old_map()).size());
-  std::fill_n(bytes.begin(), 16384, '\x5a');
-  const MapCheck check = recover_map(write("damaged.db", bytes), path("recovered.db"));
-  EXPECT_EQ(check.places, places);
-  EXPECT_EQ(check.damage.size(), 1U);
-  EXPECT_TRUE(check_map(path("recovered.db")).damage.empty());
+  // A larger one, which has other rows where images begin today.
+  add_session(map_path_, 120);
+  change(map_path_, "DROP TABLE image; PRAGMA user_version = 1; VACUUM");
+  EXPECT_EQ(places_of(map_path_).size(), 120U);
+  for (std::string bytes : {read_bytes(LOOPBIT_OLD_MAP), read_bytes(map_path_)}) {
+    const auto places = static_cast<std::int64_t>(places_of(write("whole.db", bytes)).size());
+    std::fill_n(bytes.begin(), 16384, '\x5a');
+    fs::remove(path("recovered.db"));
+    const MapCheck check = recover_map(write("damaged.db", bytes), path("recovered.db"));
+    EXPECT_EQ(check.places, places);
+    EXPECT_EQ(check.damage.size(), 1U);
+    EXPECT_TRUE(check_map(path("recovered.db")).damage.empty());
+  }
 }
 
 TEST_F(MapImagesTest, AMapOfVersion1WithAStrangeTableIsNotTouched) {
