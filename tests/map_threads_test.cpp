@@ -13,6 +13,7 @@
 
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
+#include "loopbit/map_tools.hpp"
 
 #include "batch_writer.hpp"
 #include "map_schema.hpp"
@@ -39,6 +40,7 @@ void read_until(const std::atomic<bool>& is_done, const std::string& path, const
     });
     EXPECT_GE(places, earlier_places + saved);
     EXPECT_TRUE(map.damage().empty());
+    EXPECT_TRUE(check_map(path).damage.empty());
   } while (!is_done);
 }
 

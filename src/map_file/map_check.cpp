@@ -106,20 +106,13 @@ MapCheck copy_to_new(MapReader& source, const std::string& to) {
   return counts;
 }
 
-/// A clause for each image of a place that is none of `places`, which are in order.
-std::vector<std::string> stray_images(const std::string& path,
-                                      const std::vector<std::int64_t>& places) {
-  const Database database = open_map_for_reading(path);
-  Damage damage;
+/// The places that images are listed of, in order.
+std::vector<std::int64_t> listed_images(const std::string& path, Damage& damage) {
+  std::vector<std::int64_t> places;
   for_each_image(
-      database,
-      [&](std::int64_t place, std::int64_t /*bytes*/) {
-        if (std::binary_search(places.begin(), places.end(), place)) return;
-        damage.add(
-            fmt::format("place {}: there is an image of it, but no place that is whole", place));
-      },
-      damage);
-  return damage.clauses();
+      open_map_for_reading(path),
+      [&](std::int64_t place, std::int64_t /*bytes*/) { places.push_back(place); }, damage);
+  return places;
 }
 
 bool has_whole_image(const std::string& path) {
@@ -143,22 +136,30 @@ bool can_be_opened(const std::string& path) {
 MapCheck check_map(const std::string& path) {
   MapReader map(path);
   MapCheck check{.sessions = static_cast<std::int64_t>(map.sessions().size())};
-  std::set<int> described;
-  for (const MapSession& session : map.sessions()) described.insert(session.session);
-  std::set<int> undescribed;
+  // A writer may add to the map in between: images are listed before their places, and sessions
+  // looked for after them.
+  Damage damage;
+  const std::vector<std::int64_t> images = listed_images(path, damage);
   std::vector<std::int64_t> places;
+  std::set<int> undescribed;
   map.for_each_place([&](const MapPlace& place) {
-    if (!described.contains(place.at.session)) undescribed.insert(place.at.session);
+    undescribed.insert(place.at.session);
     if (map.features_of(place)) ++check.places;
     if (map.image_of(place)) ++check.images;
     places.push_back(place.id);
   });
   check.loops = static_cast<std::int64_t>(map.loops().size());
   check.damage = map.damage();
+  const MapReader now(path);
+  for (const MapSession& session : now.sessions()) undescribed.erase(session.session);
   for (const int session : undescribed) {
     check.damage.push_back(fmt::format("session {}: its description is missing", session));
   }
-  for (std::string& clause : stray_images(path, places)) check.damage.push_back(std::move(clause));
+  for (const std::int64_t place : images) {
+    if (std::binary_search(places.begin(), places.end(), place)) continue;
+    damage.add(fmt::format("place {}: there is an image of it, but no place that is whole", place));
+  }
+  check.damage.insert(check.damage.end(), damage.clauses().begin(), damage.clauses().end());
   for (const std::string& fault : map.check_structure()) {
     check.damage.push_back(fmt::format("the file: {}", fault));
   }
