@@ -40,7 +40,7 @@ void read_until(const std::atomic<bool>& is_done, const std::string& path, const
     });
     EXPECT_GE(places, earlier_places + saved);
     EXPECT_TRUE(map.damage().empty());
-    EXPECT_TRUE(check_map(path).damage.empty());
+    EXPECT_EQ(check_map(path).damage, std::vector<std::string>{});
   } while (!is_done);
 }
 
