@@ -48,6 +48,7 @@ class MapThreads : public ScratchTest {};
 
 TEST_F(MapThreads, ADetectorAddsWhileReadersReadTheFile) {
   constexpr int kScenes = 12;
+  constexpr std::size_t kReaders = 2;
   const std::string map_path = path("map.db");
   const auto drive = [](LoopDetector& detector, MapWriter& map) {
     int loops = 0;
@@ -67,14 +68,15 @@ TEST_F(MapThreads, ADetectorAddsWhileReadersReadTheFile) {
   LoopDetector detector(fast_options(), map);
   std::atomic<bool> is_done = false;
   std::vector<std::thread> readers;
-  for (int i = 0; i < 2; ++i) {
+  readers.reserve(kReaders);
+  for (std::size_t i = 0; i < kReaders; ++i) {
     readers.emplace_back([&] { read_until(is_done, map_path, *map, kScenes); });
   }
   EXPECT_GT(drive(detector, *map), kScenes / 2);
   map->finish();
   is_done = true;
   for (std::thread& reader : readers) reader.join();
-  EXPECT_EQ(places_of(map_path).size(), std::size_t{2 * kScenes});
+  EXPECT_EQ(places_of(map_path).size(), std::size_t{2} * kScenes);
 }
 
 TEST_F(MapThreads, PendingFeaturesAreGivenWhileTheyAreCommitted) {
