@@ -19,6 +19,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
+#include "loopbit/picture_jpeg.hpp"
 #include "loopbit/world.hpp"
 
 namespace {
@@ -73,7 +74,7 @@ void make_map(const std::string& path, int places) {
   const auto shared = std::make_shared<const Features>(std::move(features));
   Drift drift;
   for (PlaceId frame = 0; frame < places; ++frame) {
-    map.add({.frame = frame}, drift.next(), shared);
+    map.add({.frame = frame}, drift.next(), shared, cv::Mat());
   }
   map.finish();
 }
@@ -115,7 +116,7 @@ class MemoryMap : public loopbit::MapStorage {
     return features_[static_cast<std::size_t>(place)];
   }
   void add(const Detection& detection, const BinaryContent& content,
-           std::shared_ptr<const Features> features) override {
+           std::shared_ptr<const Features> features, const cv::Mat& /*image*/) override {
     origins_.push_back({session_, detection.frame});
     if (detection.status == loopbit::Status::loop) {
       const auto match = detection.earlier_match.value_or(
@@ -166,36 +167,50 @@ void print_times(int session, const char* map, const Times& times) {
       session, map, mean(times.thread), p99(times.thread), mean(times.wall), p99(times.wall));
 }
 
-/// Two laps of the built-in world as two sessions. Each frame is processed with both maps in turn.
+/// Two laps of the built-in world as two sessions. Each frame is processed with all maps in turn.
 bool bench_frames(const std::string& folder) {
   const loopbit::WorldOptions world_options{.frames = 400};
   const loopbit::World world(world_options);
   const std::string path = folder + "/town.db";
+  const std::string path_with_images = folder + "/town_images.db";
   const auto memory = std::make_shared<MemoryMap>();
   const int lap = world_options.frames / 2;
   bool same = true;
   for (int session = 1; session <= 2; ++session) {
     const auto disk = std::make_shared<MapWriter>(path, LoopDetectorOptions{}, "town");
+    const auto images = std::make_shared<MapWriter>(path_with_images, LoopDetectorOptions{}, "town",
+                                                    loopbit::picture_jpeg);
     LoopDetector on_disk(LoopDetectorOptions{}, disk);
+    LoopDetector with_images(LoopDetectorOptions{}, images);
     LoopDetector in_memory(LoopDetectorOptions{}, memory);
     Times disk_times;
+    Times image_times;
     Times memory_times;
     for (int frame = 0; frame < lap; ++frame) {
       const cv::Mat image = world.render((session - 1) * lap + frame);
       Detection a;
       Detection b;
+      Detection c;
       memory_times.measure(in_memory, image, a);
       disk_times.measure(on_disk, image, b);
+      image_times.measure(with_images, image, c);
       same = same && a.status == b.status && a.score == b.score;
+      same = same && a.status == c.status && a.score == c.score;
     }
     disk->finish();
+    images->finish();
     memory->end_session();
     print_times(session, "memory", memory_times);
     print_times(session, "disk", disk_times);
+    print_times(session, "disk_with_images", image_times);
   }
-  fmt::print("size bytes_per_place={:.0f}\n",
-             static_cast<double>(std::filesystem::file_size(path)) / world_options.frames);
+  const auto bytes_per_place = [&](const std::string& map) {
+    return static_cast<double>(std::filesystem::file_size(map)) / world_options.frames;
+  };
+  fmt::print("size bytes_per_place={:.0f} with_images={:.0f}\n", bytes_per_place(path),
+             bytes_per_place(path_with_images));
   std::filesystem::remove(path);
+  std::filesystem::remove(path_with_images);
   return same;
 }
 

@@ -10,6 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     (void)loopbit::check_map(path);
     loopbit::MapReader map(path);
     map.for_each_earlier_place([](const auto&, const auto&) {});
+    (void)map.images();
     (void)loopbit::export_loops(map, loopbit::ExportFormat::json);
     (void)map.options();
   });

@@ -175,6 +175,38 @@ class MapCommandTest(CommandTest):
         g2o = loopbit("map", "export", self.map, "--format", "g2o").stdout.splitlines()
         self.assertEqual(sum(line.startswith("EDGE_SE3:QUAT") for line in g2o), len(loops))
 
+    def test_images_are_kept_shown_and_forgotten(self):
+        path, shown, all_images = (self.scratch / name for name in ("kept.db", "shown", "all"))
+        few = self.few_images()
+        ran = loopbit("run", few, "--map", path, "--keep-images", "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        info = json.loads(loopbit("map", "info", path, "--json").stdout)
+        self.assertEqual(info["images"], 14)
+        self.assertGreater(info["image_bytes"], 14 * 1000)
+        self.assertIn("images     14", loopbit("map", "info", path).stdout)
+
+        ran = loopbit("query", path, few / "000007.png", "--places", "1", "--json",
+                      "--place-images", shown)
+        file = pathlib.Path(json.loads(ran.stdout)["places"][0]["image"])
+        self.assertEqual(file, shown / "1_000007.jpg")
+        self.assertEqual(loopbit("query", path, file, "--places", "1").stdout.split()[-5:-3],
+                         ["1", "7"])
+        self.assert_fails(loopbit("query", path, file, "--place-images", shown), 4, shown)
+
+        self.assertIn("14 in", loopbit("map", "images", path, "--out", all_images).stdout)
+        self.assertEqual((all_images / "1_000007.jpg").read_bytes(), file.read_bytes())
+        self.assertEqual(len(list(all_images.iterdir())), 14)
+        self.assert_fails(loopbit("map", "images", path, "--out", all_images), 4, all_images)
+
+        self.assertEqual(loopbit("map", "compact", path, "--drop-images").returncode, 0)
+        self.assertIn("14 places, 0 loops, 0 images", loopbit("map", "check", path).stdout)
+
+    def test_images_need_a_map(self):
+        ran = loopbit("run", self.laps[0], "--out", self.out, "--keep-images")
+        self.assertEqual(ran.returncode, 2)
+        self.assertIn("--keep-images requires --map", ran.stderr)
+        self.assertFalse(self.out.exists())
+
     def test_merge_compact_and_check(self):
         merged = self.scratch / "merged.db"
         self.assertIn("2 sessions", loopbit("map", "merge", merged, self.map).stdout)

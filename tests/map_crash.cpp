@@ -26,7 +26,8 @@ using loopbit::MapPlace;
 constexpr std::chrono::microseconds kPause{200};
 
 [[noreturn]] void write_for_ever(const std::string& path) {
-  loopbit::MapWriter map(path, loopbit::test::fast_options(), "crash test");
+  loopbit::MapWriter map(path, loopbit::test::fast_options(), "crash test",
+                         loopbit::test::encode_image);
   std::int64_t told = 0;
   for (int frame = 0;; ++frame) {
     loopbit::test::add_frame(map, frame);
@@ -49,7 +50,8 @@ bool verify(const std::string& path) {
     const auto features = map.features_of(place);
     all_true = all_true && place.at.frame == frame &&
                place.content == loopbit::test::content_of(frame) && features &&
-               loopbit::test::same_features(*features, loopbit::test::few_features(frame));
+               loopbit::test::same_features(*features, loopbit::test::few_features(frame)) &&
+               map.image_of(place) == loopbit::test::image_bytes(frame);
   });
   for (const auto& [session, number] : places) fmt::print("{} {}\n", session, number);
   return all_true && map.damage().empty() && map.check_structure().empty();

@@ -35,8 +35,8 @@ class MapDamage : public ScratchTest {
  protected:
   void SetUp() override {
     ScratchTest::SetUp();
-    add_session(path("map.db"), kFrames - 20, "first");
-    add_session(path("map.db"), 20, "second", SessionFrame{1, 2});
+    add_session(path("map.db"), kFrames - 20, "first", std::nullopt, encode_image);
+    add_session(path("map.db"), 20, "second", SessionFrame{1, 2}, encode_image);
     bytes_ = read_bytes(path("map.db"));
   }
 
@@ -51,7 +51,8 @@ class MapDamage : public ScratchTest {
       for (const MapLoop& loop : map.loops()) {
         EXPECT_EQ(loop, (MapLoop{{2, 19}, {1, 2}, 30.5, 0.25, 40, 31})) << what;
       }
-      const bool whole = check.places == kFrames && check.loops == 1 && check.sessions == 2;
+      const bool whole = check.places == kFrames && check.images == kFrames && check.loops == 1 &&
+                         check.sessions == 2;
       EXPECT_TRUE(whole || !check.damage.empty()) << what << " is not told";
       ++(whole ? outcomes_.whole : outcomes_.partial);
     } catch (const Error& error) {
@@ -135,6 +136,7 @@ TEST_F(MapDamage, AMapWithoutItsFirstPageIsRecovered) {
   expect_error(ErrorKind::input, {file, "check"}, [&] { const MapReader map(file); });
   const MapCheck check = recover_map(file, path("recovered.db"));
   EXPECT_EQ(check.places, kFrames);
+  EXPECT_EQ(check.images, kFrames);
   EXPECT_EQ(check.sessions, 2);
   EXPECT_EQ(check.loops, 1);
   EXPECT_EQ(check.damage.size(), 1U);

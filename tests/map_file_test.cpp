@@ -77,7 +77,8 @@ TEST_F(MapFile, UnreadableFramesAreNoPlaces) {
   {
     MapWriter map(map_path_, fast_options(), "drive");
     add_frame(map, 0);
-    map.add({.frame = 1, .status = Status::unreadable}, {}, std::make_shared<const Features>());
+    map.add({.frame = 1, .status = Status::unreadable}, {}, std::make_shared<const Features>(),
+            cv::Mat());
     add_frame(map, 2);
   }
   MapReader map(map_path_);
@@ -154,8 +155,8 @@ TEST_F(MapFile, OtherFilesAreRefused) {
 
 TEST_F(MapFile, ANewerVersionIsRefused) {
   add_session(map_path_, 1);
-  change(map_path_, "PRAGMA user_version = 2");
-  const auto words = {std::string_view("version 2"), std::string_view("newer loopbit")};
+  change(map_path_, "PRAGMA user_version = 3");
+  const auto words = {std::string_view("version 3"), std::string_view("newer loopbit")};
   expect_error(ErrorKind::input, words, [&] { const MapReader map(map_path_); });
   expect_error(ErrorKind::input, words,
                [&] { const MapWriter map(map_path_, fast_options(), "drive"); });

@@ -51,6 +51,18 @@ bool same_features(const Features& a, const Features& b) {
                     [&](const Keypoint& p, const Keypoint& q) { return values(p) == values(q); });
 }
 
+std::vector<unsigned char> image_bytes(int number) {
+  std::vector<unsigned char> bytes(static_cast<std::size_t>(1000 + number % 7));
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    bytes[i] = static_cast<unsigned char>(7 * i + static_cast<std::size_t>(number));
+  }
+  return bytes;
+}
+
+std::vector<unsigned char> encode_image(const cv::Mat& image) {
+  return image_bytes(image.at<int>(0, 0));
+}
+
 void add_frame(MapWriter& map, int frame, std::optional<SessionFrame> loop) {
   Detection detection{.frame = frame, .timestamp_s = 0.5 * frame};
   if (loop) {
@@ -61,13 +73,14 @@ void add_frame(MapWriter& map, int frame, std::optional<SessionFrame> loop) {
     detection.matches = 40;
     detection.inliers = 31;
   }
-  map.add(detection, content_of(frame), std::make_shared<const Features>(few_features(frame)));
+  map.add(detection, content_of(frame), std::make_shared<const Features>(few_features(frame)),
+          cv::Mat(1, 1, CV_32S, cv::Scalar(frame)));
 }
 
 /// A map of one more session of `frames` frames.
 void add_session(const std::string& path, int frames, const std::string& name,
-                 std::optional<SessionFrame> loop_of_last) {
-  MapWriter map(path, fast_options(), name);
+                 std::optional<SessionFrame> loop_of_last, const EncodeImage& encode) {
+  MapWriter map(path, fast_options(), name, encode);
   for (int frame = 0; frame < frames; ++frame) {
     add_frame(map, frame, frame + 1 == frames ? loop_of_last : std::nullopt);
   }
@@ -90,6 +103,8 @@ void expect_only_true_places(MapReader& map) {
   for (const MapPlace& place : places_of(map)) {
     EXPECT_EQ(place.content, content_of(place.at.frame)) << place.id;
     EXPECT_EQ(place.timestamp_s, 0.5 * place.at.frame);
+    const auto image = map.image_of(place);
+    EXPECT_EQ(image.value_or(image_bytes(place.at.frame)), image_bytes(place.at.frame)) << place.id;
     const auto features = map.features_of(place);
     if (!features) continue;
     EXPECT_TRUE(same_features(*features, few_features(place.at.frame))) << place.id;

@@ -26,17 +26,25 @@ Features few_features(int number);
 
 bool same_features(const Features& a, const Features& b);
 
+/// What encode_image() makes of frame `number`: 1 KB.
+std::vector<unsigned char> image_bytes(int number);
+
+/// For MapWriter: gives the image_bytes() of the frame that add_frame() added.
+std::vector<unsigned char> encode_image(const cv::Mat& image);
+
 /// `loop`: the place that the frame is found to be.
 void add_frame(MapWriter& map, int frame, std::optional<SessionFrame> loop = std::nullopt);
 
 /// Adds a session of so many frames to a map.
 void add_session(const std::string& path, int frames, const std::string& name = "drive",
-                 std::optional<SessionFrame> loop_of_last = std::nullopt);
+                 std::optional<SessionFrame> loop_of_last = std::nullopt,
+                 const EncodeImage& encode = {});
 
 std::vector<MapPlace> places_of(MapReader& map);
 std::vector<MapPlace> places_of(const std::string& path);
 
-/// Expects every place to be what add_frame() wrote for its frame, with its features or without.
+/// Expects every place to be what add_frame() wrote for its frame, with its features and image
+/// or without.
 void expect_only_true_places(MapReader& map);
 
 std::string read_bytes(const std::string& path);

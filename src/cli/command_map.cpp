@@ -15,6 +15,7 @@
 
 #include "commands.hpp"
 #include "map_damage.hpp"
+#include "place_images.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -50,10 +51,17 @@ void info_command(const std::string& path, bool json) {
   MapReader map(path);
   const std::int64_t places = sum(places_of(map));
   const std::int64_t loops = sum(loops_of(map));
+  const MapImages images = map.images();
   const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(path));
   if (json) {
-    Json info{{"path", path},     {"bytes", bytes}, {"sessions", map.sessions().size()},
-              {"places", places}, {"loops", loops}, {"options", nullptr}};
+    Json info{{"path", path},
+              {"bytes", bytes},
+              {"sessions", map.sessions().size()},
+              {"places", places},
+              {"loops", loops},
+              {"images", images.number},
+              {"image_bytes", images.bytes},
+              {"options", nullptr}};
     if (!map.sessions().empty()) info["options"] = Json::parse(to_json(map.options()));
     fmt::print("{}\n", dump(info));
   } else {
@@ -63,6 +71,10 @@ void info_command(const std::string& path, bool json) {
                  static_cast<double>(bytes) / 1e3 / static_cast<double>(places));
     fmt::print("\nsessions   {}\nplaces     {}\nloops      {}\n", map.sessions().size(), places,
                loops);
+    if (images.number > 0) {
+      fmt::print("images     {}, {:.1f} MB\n", images.number,
+                 static_cast<double>(images.bytes) / 1e6);
+    }
     for (const MapSession& session : map.sessions()) {
       fmt::print("  {:>9} {} ({}, {} frames)\n", session.session, session.name, session.started,
                  session.frames);
@@ -120,11 +132,18 @@ void export_command(const std::string& path, ExportFormat format, const std::str
   warn_of_damage(map);
 }
 
+void images_command(const std::string& path, const std::string& folder) {
+  MapReader map(path);
+  PlaceImages images(map, folder);
+  fmt::print("images     {} in {}\n", images.write_all(), folder);
+  warn_of_damage(map);
+}
+
 int check_command(const std::string& path, const std::string& recover) {
   const MapCheck check = recover.empty() ? check_map(path) : recover_map(path, recover);
   for (const std::string& clause : check.damage) fmt::print("damaged    {}\n", clause);
-  fmt::print("whole      {} sessions, {} places, {} loops\n", check.sessions, check.places,
-             check.loops);
+  fmt::print("whole      {} sessions, {} places, {} loops, {} images\n", check.sessions,
+             check.places, check.loops, check.images);
   if (!recover.empty()) {
     fmt::print("written    {}\n", recover);
     return success;
@@ -136,10 +155,10 @@ int check_command(const std::string& path, const std::string& recover) {
 }
 
 void compact_command(const std::string& path, const CompactOptions& options) {
-  if (options.drop_sessions.empty() && options.max_places == 0) {
+  if (options.drop_sessions.empty() && options.max_places == 0 && !options.drop_images) {
     throw Error(ErrorKind::option,
                 "What is to be forgotten? Name sessions by --drop, a number of places by --budget, "
-                "or both.");
+                "images by --drop-images, or several of them.");
   }
   const CompactCounts counts = compact_map(path, options);
   fmt::print("places     {} of {} kept\n", counts.places_after, counts.places_before);
@@ -185,6 +204,15 @@ void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
       ->type_name("FILE");
   export_loops->callback([flags] { export_command(flags->map, flags->format, flags->out); });
 
+  CLI::App* images =
+      add_command(map, flags, "images", "Write the images that 'loopbit run --keep-images' kept");
+  images
+      ->add_option("--out", flags->out,
+                   "A new folder, for a file SESSION_FRAME.jpg of each place that has an image")
+      ->type_name("DIR")
+      ->required();
+  images->callback([flags] { images_command(flags->map, flags->out); });
+
   CLI::App* check = add_command(map, flags, "check", "Read every byte, and say what is damaged");
   check->add_option("--recover", flags->recover, "Copy what is whole to a new map")
       ->type_name("NEW.db");
@@ -197,7 +225,8 @@ void add_writers(CLI::App& map, const Flags& flags) {
       ->required();
   merge->callback([flags] { merge_command(flags->map, flags->others); });
 
-  CLI::App* compact = add_command(map, flags, "compact", "Forget sessions or redundant places");
+  CLI::App* compact =
+      add_command(map, flags, "compact", "Forget sessions, redundant places or images");
   compact
       ->add_option("--drop", flags->compact.drop_sessions, "A session to forget; may be repeated")
       ->type_name("SESSION")
@@ -207,6 +236,7 @@ void add_writers(CLI::App& map, const Flags& flags) {
                    "Keep at most so many places, those that others stand for least")
       ->type_name("PLACES")
       ->check(CLI::Range(std::int64_t{1}, std::int64_t{2'000'000'000}));
+  compact->add_flag("--drop-images", flags->compact.drop_images, "Forget the images of places");
   compact->callback([flags] { compact_command(flags->map, flags->compact); });
 }
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,6 +19,7 @@
 
 #include "commands.hpp"
 #include "map_damage.hpp"
+#include "place_images.hpp"
 #include "stop_signal.hpp"
 
 namespace loopbit::cli {
@@ -30,6 +32,7 @@ struct QueryFlags {
   std::vector<std::string> images;
   std::string watch;
   std::size_t places = 3;
+  std::string place_images;
   std::vector<std::string> settings;
   bool json = false;
 };
@@ -50,12 +53,20 @@ LoopDetectorOptions detector_options(const MapReader& map, const QueryFlags& fla
   return options;
 }
 
-void print_row(const std::string& image, std::string_view status, const RankedPlace& place) {
-  fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7.1f}  {:>10.3f}  {:>7}\n", image, status,
-             place.place.session, place.place.frame, place.score, place.similarity, place.inliers);
+/// A place that is shown.
+struct ShownPlace {
+  RankedPlace ranked;
+  std::string image = {};  ///< its file; empty if there is none
+};
+
+void print_row(const std::string& image, std::string_view status, const ShownPlace& shown) {
+  const RankedPlace& place = shown.ranked;
+  fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7.1f}  {:>10.3f}  {:>7}{}{}\n", image, status,
+             place.place.session, place.place.frame, place.score, place.similarity, place.inliers,
+             shown.image.empty() ? "" : "  ", shown.image);
 }
 
-void print_table(const std::string& image, Status status, const std::vector<RankedPlace>& places) {
+void print_table(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
   if (places.empty()) fmt::print("{:<24}  {}\n", image, to_string(status));
   for (std::size_t i = 0; i < places.size(); ++i) {
     print_row(i == 0 ? image : "", i == 0 ? to_string(status) : "", places[i]);
@@ -63,16 +74,17 @@ void print_table(const std::string& image, Status status, const std::vector<Rank
 }
 
 /// One line an image, so that a program can read them as they come.
-void print_json(const std::string& image, Status status, const std::vector<RankedPlace>& places) {
+void print_json(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
   using Json = nlohmann::ordered_json;
   Json json{{"image", image}, {"status", to_string(status)}, {"places", Json::array()}};
-  for (const RankedPlace& place : places) {
+  for (const auto& [place, file] : places) {
     json["places"].push_back({{"session", place.place.session},
                               {"frame", place.place.frame},
                               {"score", place.score},
                               {"similarity", place.similarity},
                               {"matches", place.matches},
                               {"inliers", place.inliers}});
+    if (!file.empty()) json["places"].back()["image"] = file;
   }
   fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
 }
@@ -84,6 +96,7 @@ class Relocalizer {
       : flags_(flags),
         map_(std::make_shared<MapReader>(flags.map)),
         detector_(detector_options(*map_, flags), map_) {
+    if (!flags.place_images.empty()) place_images_.emplace(*map_, flags.place_images);
     if (!flags.json) {
       fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7}  {:>10}  {:>7}\n", "image", "status",
                  "session", "frame", "score", "similarity", "inliers");
@@ -113,12 +126,18 @@ class Relocalizer {
       fmt::print(stderr, "loopbit: '{}': {}\n", frame.name, error.what());
     }
     if (places.size() > flags_.places) places.resize(flags_.places);
-    (flags_.json ? print_json : print_table)(frame.name, status, places);
+    std::vector<ShownPlace> shown;
+    shown.reserve(places.size());
+    for (const RankedPlace& place : places) {
+      shown.push_back({place, place_images_ ? place_images_->file_of(place.place) : ""});
+    }
+    (flags_.json ? print_json : print_table)(frame.name, status, shown);
   }
 
   const QueryFlags& flags_;
   std::shared_ptr<MapReader> map_;
   LoopDetector detector_;
+  std::optional<PlaceImages> place_images_;
   bool any_readable_ = false;
 };
 
@@ -159,6 +178,10 @@ void add_query(CLI::App& app, int& exit_code) {
       ->type_name("N")
       ->capture_default_str()
       ->check(CLI::Range(1, 1000));
+  command
+      ->add_option("--place-images", flags->place_images,
+                   "A new folder for the images of the places shown, if the map keeps any")
+      ->type_name("DIR");
   command->add_flag("--json", flags->json, "Print a JSON object an image, one a line");
   command
       ->add_option("--set", flags->settings,

@@ -17,6 +17,7 @@
 #include "loopbit/evidence_file.hpp"
 #include "loopbit/finished_run.hpp"
 #include "loopbit/map_file.hpp"
+#include "loopbit/picture_jpeg.hpp"
 #include "loopbit/run_folder.hpp"
 #include "loopbit/runner.hpp"
 
@@ -93,6 +94,8 @@ void SessionFlags::add_to(CLI::App& command) {
                   "Continue this map, made if there is none: earlier sessions' places are "
                   "recognised, too")
       ->type_name("MAP.db");
+  command.add_flag("--keep-images", keep_images, "Keep a small JPEG of each place in the map")
+      ->needs("--map");
   CLI::Option* named =
       command.add_option("--preset", preset, "Named settings to begin with: default or paper")
           ->type_name("NAME");
@@ -141,7 +144,8 @@ int run_session(Session session, const SessionFlags& flags) {
   // Before the folder: what refuses the run may not cost an earlier one.
   std::shared_ptr<MapWriter> map;
   if (!flags.map.empty()) {
-    map = std::make_shared<MapWriter>(flags.map, record.options, session.input);
+    map = std::make_shared<MapWriter>(flags.map, record.options, session.input,
+                                      flags.keep_images ? picture_jpeg : EncodeImage{});
     record.map_path = flags.map;
     record.map_session = map->session();
   }

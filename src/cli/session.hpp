@@ -21,8 +21,9 @@ namespace loopbit::cli {
 
 /// The flags that every command with a detector shares.
 struct SessionFlags {
-  std::string out;  ///< empty = beside the map, named after it
-  std::string map;  ///< empty = none
+  std::string out;           ///< empty = beside the map, named after it
+  std::string map;           ///< empty = none
+  bool keep_images = false;  ///< in the map
   bool overwrite = false;
   std::string preset = "default";
   std::string config;

@@ -29,7 +29,8 @@ Database::Database(std::string path, Access access, Remedies remedies)
     : path_(std::move(path)), access_(access), remedies_(std::move(remedies)) {
   // Readers may write, too, where the system lets them: what a killed writer began has to be undone
   // before anything can be read.
-  const int flags = SQLITE_OPEN_READWRITE | (access == Access::create ? SQLITE_OPEN_CREATE : 0);
+  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX |
+                    (access == Access::create ? SQLITE_OPEN_CREATE : 0);
   sqlite3* handle = nullptr;
   const int result = sqlite3_open_v2(path_.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);  // must be closed even if it could not be opened

@@ -184,8 +184,8 @@ class LoopDetector::Impl {
     return places;
   }
 
-  void remember(Observation seen, const Detection& detection) {
-    const PlaceId place = add_place(seen.content, std::move(seen.features), detection);
+  void remember(Observation seen, const Detection& detection, const cv::Mat& image) {
+    const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
     if (detection.status == Status::loop) {
       known_loops_.add(recent_view_.step_of(place), seen.best->step);
@@ -202,7 +202,7 @@ class LoopDetector::Impl {
     Detection detection{.frame = size(),
                         .timestamp_s = is_usable ? *timestamp_s : last_s,
                         .status = Status::unreadable};
-    add_place(BinaryContent{}, Features{}, detection);
+    add_place(BinaryContent{}, Features{}, detection, cv::Mat());
     detection.timestamp_s = timestamp_s;
     return detection;
   }
@@ -246,8 +246,9 @@ class LoopDetector::Impl {
     }
   }
 
-  PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection) {
-    memory_.add(detection, content, std::move(features));
+  PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection,
+                    const cv::Mat& image) {
+    memory_.add(detection, content, std::move(features), image);
     times_s_.push_back(detection.timestamp_s.value_or(0.0));
     return index_.add(content);
   }
@@ -467,7 +468,7 @@ Detection LoopDetector::process(const cv::Mat& image, std::optional<double> time
   Impl::Observation seen;
   Detection detection = impl_->detect(image, timestamp_s, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
-  impl_->remember(std::move(seen), detection);
+  impl_->remember(std::move(seen), detection, image);
   return detection;
 }
 

@@ -39,12 +39,13 @@ std::ptrdiff_t PlaceMemory::step_of(PlaceId place) const {
   return step - earlier_.back().step - kStepsBetweenSessions;
 }
 
-void PlaceMemory::add(const Detection& detection, const BinaryContent& content, Features features) {
+void PlaceMemory::add(const Detection& detection, const BinaryContent& content, Features features,
+                      const cv::Mat& image) {
   if (!map_) {
     features_.push_back(std::move(features));
     return;
   }
-  map_->add(detection, content, std::make_shared<const Features>(std::move(features)));
+  map_->add(detection, content, std::make_shared<const Features>(std::move(features)), image);
 }
 
 const Features& PlaceMemory::features(PlaceId place) const {

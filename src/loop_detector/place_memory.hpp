@@ -55,7 +55,8 @@ class PlaceMemory {
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
 
   /// Throws as MapStorage::add does, and stays as it was.
-  void add(const Detection& detection, const BinaryContent& content, Features features);
+  void add(const Detection& detection, const BinaryContent& content, Features features,
+           const cv::Mat& image);
 
   /// Valid until release().
   [[nodiscard]] const Features& features(PlaceId place) const;

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::size_t kFramesPerBatch = 32;
 constexpr std::chrono::seconds kMaxDelay{1};
-/// 12 MB of features.
+/// 12 MB of features, and 50 MB of images where these are kept.
 constexpr std::size_t kMaxPendingFrames = 256;
 
 MapLoop loop_of(const Detection& detection, int session) {
@@ -29,11 +29,13 @@ MapLoop loop_of(const Detection& detection, int session) {
 
 }  // namespace
 
-BatchWriter::BatchWriter(Database database, MapSession session, std::int64_t first_place)
+BatchWriter::BatchWriter(Database database, MapSession session, std::int64_t first_place,
+                         EncodeImage encode_image)
     : database_(std::move(database)),
       rows_(database_),
       session_(std::move(session)),
       first_place_(first_place),
+      encode_image_(std::move(encode_image)),
       thread_([this] { commit_batches(); }) {}
 
 BatchWriter::~BatchWriter() {
@@ -118,11 +120,12 @@ void BatchWriter::write(const AddedFrame& frame) {
   const Detection& detection = frame.detection;
   if (detection.status == Status::unreadable) return;
   const bool has_time = detection.timestamp_s && std::isfinite(*detection.timestamp_s);
-  rows_.write(MapPlace{.id = first_place_ + detection.frame,
+  const MapPlace place{.id = first_place_ + detection.frame,
                        .at = {session_.session, detection.frame},
                        .timestamp_s = has_time ? detection.timestamp_s : std::nullopt,
-                       .content = frame.content},
-              *frame.features);
+                       .content = frame.content};
+  rows_.write(place, *frame.features);
+  if (!frame.image.empty()) rows_.write_image(place, encode_image_(frame.image));
   if (detection.status == Status::loop) rows_.write(loop_of(detection, session_.session));
 }
 

@@ -23,13 +23,16 @@ struct AddedFrame {
   BinaryContent content;
   Detection detection;
   std::shared_ptr<const Features> features;
+  cv::Mat image = {};  ///< a copy of it; empty if none is kept
 };
 
 /// Commits the frames of one session in batches, on a thread of its own. The id of frame k's place
 /// is first_place + k. One thread at a time may call it.
 class BatchWriter {
  public:
-  BatchWriter(Database database, MapSession session, std::int64_t first_place);
+  /// `encode_image` may be empty.
+  BatchWriter(Database database, MapSession session, std::int64_t first_place,
+              EncodeImage encode_image);
   /// Leaves what is not committed.
   ~BatchWriter();
   BatchWriter(const BatchWriter&) = delete;
@@ -60,6 +63,7 @@ class BatchWriter {
   RowWriter rows_;
   MapSession session_;  ///< session_.frames are committed; for the thread only
   std::int64_t first_place_;
+  EncodeImage encode_image_;
 
   mutable std::mutex mutex_;  ///< guards all below
   std::condition_variable added_;

@@ -62,9 +62,10 @@ class RepairedCopy {
   RepairedCopy(RepairedCopy&&) = delete;
   RepairedCopy& operator=(RepairedCopy&&) = delete;
 
-  /// Throws Error (kind output).
-  void make(const std::string& from) const {
-    const Page page = first_page(fs::file_size(from));
+  /// `version`: of the map at `from`. Throws Error (kind output).
+  void make(const std::string& from, int version) const {
+    remove_database(path_);
+    const Page page = first_page(fs::file_size(from), version);
     std::error_code error;
     fs::copy_file(from, path_, fs::copy_options::overwrite_existing, error);
     if (error) throw cannot_write(path_, error.value());
@@ -79,8 +80,8 @@ class RepairedCopy {
   using Page = std::array<char, kMapPageBytes>;
 
   /// Of a map without rows, but of so many bytes.
-  [[nodiscard]] Page first_page(std::uintmax_t bytes) const {
-    close_log(open_map_for_writing(path_));
+  [[nodiscard]] Page first_page(std::uintmax_t bytes, int version) const {
+    close_log(open_map_for_writing(path_, version));
     Page page{};
     std::ifstream(path_, std::ios::binary).read(page.data(), page.size());
     // sqlite.org/fileformat2.html, 1.3.7: the size in pages, big-endian, at byte 28.
@@ -95,13 +96,30 @@ class RepairedCopy {
 };
 
 MapCheck copy_to_new(MapReader& source, const std::string& to) {
-  const std::vector<MapSession> sessions = all_sessions(source);
+  const CopyPlan plan{.sessions = all_sessions(source),
+                      .keeps_place = [](const MapPlace&) { return true; }};
   const WriterLock lock(to);
   const Database database = open_map_for_writing(to);
-  MapCheck counts = copy_whole(source, sessions, database, [](const MapPlace&) { return true; });
+  MapCheck counts = copy_whole(source, plan, database);
   counts.damage = source.damage();
   close_log(database);
   return counts;
+}
+
+/// The places that images are listed of, in order.
+std::vector<std::int64_t> listed_images(const std::string& path, Damage& damage) {
+  std::vector<std::int64_t> places;
+  for_each_image(
+      open_map_for_reading(path),
+      [&](std::int64_t place, std::int64_t /*bytes*/) { places.push_back(place); }, damage);
+  return places;
+}
+
+bool has_whole_image(const std::string& path) {
+  MapReader map(path);
+  bool found = false;
+  map.for_each_place([&](const MapPlace& place) { found = found || map.image_of(place); });
+  return found;
 }
 
 bool can_be_opened(const std::string& path) {
@@ -118,18 +136,30 @@ bool can_be_opened(const std::string& path) {
 MapCheck check_map(const std::string& path) {
   MapReader map(path);
   MapCheck check{.sessions = static_cast<std::int64_t>(map.sessions().size())};
-  std::set<int> described;
-  for (const MapSession& session : map.sessions()) described.insert(session.session);
+  // A writer may add to the map in between: images are listed before their places, and sessions
+  // looked for after them.
+  Damage damage;
+  const std::vector<std::int64_t> images = listed_images(path, damage);
+  std::vector<std::int64_t> places;
   std::set<int> undescribed;
   map.for_each_place([&](const MapPlace& place) {
-    if (!described.contains(place.at.session)) undescribed.insert(place.at.session);
+    undescribed.insert(place.at.session);
     if (map.features_of(place)) ++check.places;
+    if (map.image_of(place)) ++check.images;
+    places.push_back(place.id);
   });
   check.loops = static_cast<std::int64_t>(map.loops().size());
   check.damage = map.damage();
+  const MapReader now(path);
+  for (const MapSession& session : now.sessions()) undescribed.erase(session.session);
   for (const int session : undescribed) {
     check.damage.push_back(fmt::format("session {}: its description is missing", session));
   }
+  for (const std::int64_t place : images) {
+    if (std::binary_search(places.begin(), places.end(), place)) continue;
+    damage.add(fmt::format("place {}: there is an image of it, but no place that is whole", place));
+  }
+  check.damage.insert(check.damage.end(), damage.clauses().begin(), damage.clauses().end());
   for (const std::string& fault : map.check_structure()) {
     check.damage.push_back(fmt::format("the file: {}", fault));
   }
@@ -145,7 +175,9 @@ MapCheck recover_map(const std::string& from, const std::string& to) {
     return copy_to_new(source, to);
   }
   const RepairedCopy copy(to + ".part");
-  copy.make(from);
+  copy.make(from, kMapVersion);
+  // Another page is where images begin, or there are none.
+  if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
   MapReader source(copy.path());
   MapCheck check = copy_to_new(source, to);
   check.damage.insert(check.damage.begin(), "the file: its first page cannot be read");

@@ -83,14 +83,15 @@ void keep_sequences(const Database& from, const Database& to) {
 void write_compact(const std::string& path, const std::string& part, const CompactOptions& options,
                    CompactCounts& counts) {
   MapReader map(path);
-  const auto sessions = sessions_but(map, options.drop_sessions);
+  CopyPlan plan{.sessions = sessions_but(map, options.drop_sessions),
+                .keeps_place = {},
+                .keeps_images = !options.drop_images};
   const auto kept = remaining(map, options);
+  plan.keeps_place = [&](const MapPlace& place) { return kept.contains(place.id); };
   map.for_each_place([&](const MapPlace&) { ++counts.places_before; });
   const Database old = open_map_for_reading(path);
   const Database compact = open_map_for_writing(part);
-  counts.places_after = copy_whole(map, sessions, compact, [&](const MapPlace& place) {
-                          return kept.contains(place.id);
-                        }).places;
+  counts.places_after = copy_whole(map, plan, compact).places;
   refuse_damaged(map.path(), map.damage());
   keep_sequences(old, compact);
   close_log(compact);

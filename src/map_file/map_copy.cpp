@@ -19,10 +19,11 @@ void MapCopy::copy_session(MapSession session) {
   rows_.write(session);
 }
 
-bool MapCopy::copy_place(const MapPlace& place, const Features& features) {
+bool MapCopy::copy_place(const MapPlace& place, const Features& features, const Image& image) {
   MapPlace copy = place;
   if (!renumber(copy.at)) return false;
   rows_.write(copy, features);
+  if (image) rows_.write_image(copy, *image);
   return true;
 }
 
@@ -39,19 +40,20 @@ bool MapCopy::renumber(SessionFrame& at) const {
   return true;
 }
 
-MapCheck copy_whole(MapReader& from, const std::vector<MapSession>& sessions, const Database& to,
-                    const std::function<bool(const MapPlace&)>& keeps) {
+MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
   std::map<int, int> numbers;
-  for (const MapSession& session : sessions) numbers[session.session] = session.session;
+  for (const MapSession& session : plan.sessions) numbers[session.session] = session.session;
   MapCopy copy(to, std::move(numbers));
   MapCheck counts;
   to.execute("BEGIN IMMEDIATE");
-  for (const MapSession& session : sessions) copy.copy_session(session);
-  counts.sessions = static_cast<std::int64_t>(sessions.size());
+  for (const MapSession& session : plan.sessions) copy.copy_session(session);
+  counts.sessions = static_cast<std::int64_t>(plan.sessions.size());
   from.for_each_place([&](const MapPlace& place) {
-    if (!keeps(place)) return;
+    if (!plan.keeps_place(place)) return;
     const auto features = from.features_of(place);
-    if (!features || !copy.copy_place(place, *features)) return;
+    const Image image = plan.keeps_images ? from.image_of(place) : std::nullopt;
+    if (!features || !copy.copy_place(place, *features, image)) return;
+    counts.images += image.has_value();
     if (++counts.places % kPlacesPerTransaction == 0) to.execute("COMMIT; BEGIN IMMEDIATE");
   });
   for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);

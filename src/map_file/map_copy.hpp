@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,9 @@
 
 namespace loopbit {
 
+/// The bytes of a place's image, if there is one.
+using Image = std::optional<std::vector<unsigned char>>;
+
 /// Writes sessions, places and loops of one map into another.
 class MapCopy {
  public:
@@ -24,7 +28,7 @@ class MapCopy {
   void copy_session(MapSession session);
 
   /// The two below: false if a session of theirs is left out.
-  bool copy_place(const MapPlace& place, const Features& features);
+  bool copy_place(const MapPlace& place, const Features& features, const Image& image);
   bool copy_loop(MapLoop loop);
 
  private:
@@ -34,9 +38,15 @@ class MapCopy {
   std::map<int, int> numbers_;
 };
 
-/// Copies `sessions`, their loops, and of their places those that `keeps` takes, to a new map that
-/// nobody can see yet, under the same numbers. Says what was copied.
-MapCheck copy_whole(MapReader& from, const std::vector<MapSession>& sessions, const Database& to,
-                    const std::function<bool(const MapPlace&)>& keeps);
+/// What of a map is copied.
+struct CopyPlan {
+  std::vector<MapSession> sessions;  ///< with their loops
+  std::function<bool(const MapPlace&)> keeps_place;
+  bool keeps_images = true;
+};
+
+/// Copies what is planned to a new map that nobody can see yet, under the same numbers. Says what
+/// was copied.
+MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to);
 
 }  // namespace loopbit

@@ -11,6 +11,7 @@
 
 #include "loopbit/database.hpp"
 #include "loopbit/error.hpp"
+#include "loopbit/picture.hpp"
 #include "loopbit/version.hpp"
 
 #include "batch_writer.hpp"
@@ -42,12 +43,14 @@ struct MapReader::Impl {
       : path(map_path),
         database(open_map_for_reading(map_path)),
         features(database),
+        images(database),
         stored(database),
         sessions(read_sessions(database, damage)) {}
 
   std::string path;
   Database database;
   FeatureReader features;
+  ImageReader images;
   StoredFeatures stored;  ///< of the places that for_each_earlier_place gave
   Damage damage;
   std::vector<MapSession> sessions;
@@ -79,6 +82,22 @@ std::optional<Features> MapReader::features_of(const MapPlace& place) {
   return impl_->features.read(place.id, place.at, impl_->damage);
 }
 
+MapImages MapReader::images() {
+  MapImages images;
+  for_each_image(
+      impl_->database,
+      [&](std::int64_t /*place*/, std::int64_t bytes) {
+        ++images.number;
+        images.bytes += bytes;
+      },
+      impl_->damage);
+  return images;
+}
+
+std::optional<std::vector<unsigned char>> MapReader::image_of(const MapPlace& place) {
+  return impl_->images.read(place.id, place.at, impl_->damage);
+}
+
 std::vector<std::string> MapReader::check_structure() const {
   std::vector<std::string> faults;
   Statement rows(impl_->database, "PRAGMA integrity_check");
@@ -106,7 +125,7 @@ std::shared_ptr<const Features> MapReader::features(PlaceId place) {
 }
 
 void MapReader::add(const Detection& /*detection*/, const BinaryContent& /*content*/,
-                    std::shared_ptr<const Features> /*features*/) {
+                    std::shared_ptr<const Features> /*features*/, const cv::Mat& /*image*/) {
   throw Error(ErrorKind::option,
               fmt::format("'{}' is open to be read: use LoopDetector::query, or open it by "
                           "MapWriter.",
@@ -115,8 +134,11 @@ void MapReader::add(const Detection& /*detection*/, const BinaryContent& /*conte
 
 class MapWriter::Impl {
  public:
-  Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name)
-      : lock_(path), writer_(begin_session(path, options, name)) {}
+  Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
+       EncodeImage encode_image)
+      : lock_(path),
+        keeps_images_(encode_image != nullptr),
+        writer_(begin_session(path, options, name, std::move(encode_image))) {}
 
   void finish() {
     writer_->flush();
@@ -150,9 +172,12 @@ class MapWriter::Impl {
   }
 
   void add(const Detection& detection, const BinaryContent& content,
-           std::shared_ptr<const Features> features) {
+           std::shared_ptr<const Features> features, const cv::Mat& image) {
     StoredFeatures& places = stored();
-    writer_->add({content, detection, features});
+    writer_->add({.content = content,
+                  .detection = detection,
+                  .features = features,
+                  .image = keeps_images_ ? halved_to_picture(image) : cv::Mat()});
     places.keep(places.size(), std::move(features));
     places.add(first_place_ + detection.frame, {session_, detection.frame});
     ++frames_;
@@ -164,7 +189,7 @@ class MapWriter::Impl {
  private:
   std::unique_ptr<BatchWriter> begin_session(const std::string& path,
                                              const LoopDetectorOptions& options,
-                                             const std::string& name) {
+                                             const std::string& name, EncodeImage encode_image) {
     Database database = open_map_for_writing(path);
     database_.emplace(open_map_for_reading(path));
     stored_.emplace(*database_);
@@ -179,7 +204,8 @@ class MapWriter::Impl {
                        .started = now_utc(),
                        .loopbit = kVersion,
                        .options = to_json(options)};
-    return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_);
+    return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_,
+                                         std::move(encode_image));
   }
 
   /// Throws Error (kind option) after finish().
@@ -196,6 +222,7 @@ class MapWriter::Impl {
   [[nodiscard]] PlaceId session_begin() { return stored().size() - frames_; }
 
   WriterLock lock_;
+  bool keeps_images_;
   int session_ = 0;
   std::int64_t first_place_ = 0;
   PlaceId frames_ = 0;                ///< of this session
@@ -206,13 +233,13 @@ class MapWriter::Impl {
 };
 
 MapWriter::MapWriter(const std::string& path, const LoopDetectorOptions& options,
-                     const std::string& name)
-    : impl_(std::make_unique<Impl>(path, options, name)) {}
+                     const std::string& name, EncodeImage encode_image)
+    : impl_(std::make_unique<Impl>(path, options, name, std::move(encode_image))) {}
 
 MapWriter::~MapWriter() {
   try {
     impl_->finish();
-  } catch (const Error&) {  // told by finish(), to those who ask
+  } catch (...) {  // told by finish(), to those who ask
   }
 }
 
@@ -231,8 +258,8 @@ std::shared_ptr<const Features> MapWriter::features(PlaceId place) {
 }
 
 void MapWriter::add(const Detection& detection, const BinaryContent& content,
-                    std::shared_ptr<const Features> features) {
-  impl_->add(detection, content, std::move(features));
+                    std::shared_ptr<const Features> features, const cv::Mat& image) {
+  impl_->add(detection, content, std::move(features), image);
 }
 
 }  // namespace loopbit

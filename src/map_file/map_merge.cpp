@@ -69,7 +69,7 @@ MergeCounts merge_map(const std::string& into, const std::string& from) {
     if (!features) return;
     MapPlace copied = place;
     copied.id = id++;
-    counts.places += copy.copy_place(copied, *features);
+    counts.places += copy.copy_place(copied, *features, source.image_of(place));
   });
   for (const MapLoop& loop : source.loops()) {
     if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);

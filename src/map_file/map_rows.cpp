@@ -9,6 +9,7 @@
 
 #include "loopbit/error.hpp"
 
+#include "map_schema.hpp"
 #include "row_codec.hpp"
 
 namespace loopbit {
@@ -79,6 +80,11 @@ Checksum checksum_of(const MapPlace& place) {
   return checksum_of(place.at)
       .add(place.timestamp_s.value_or(0.0))
       .add(content_bytes(place.content));
+}
+
+/// Not in the order of features, so that these never pass for an image.
+Checksum checksum_of_image(std::span<const unsigned char> jpeg, const SessionFrame& at) {
+  return Checksum().add(jpeg).add(std::int64_t{at.session}).add(std::int64_t{at.frame});
 }
 
 Checksum checksum_of(const MapLoop& loop) {
@@ -194,12 +200,47 @@ std::optional<Features> FeatureReader::read(std::int64_t place, const SessionFra
   return features;
 }
 
+void for_each_image(const Database& database,
+                    const std::function<void(std::int64_t, std::int64_t)>& visit, Damage& damage) {
+  if (!has_images(database)) return;
+  for_each_row(database, "image", "place, length(image)", damage,
+               [&](const Statement& row, std::int64_t place) { visit(place, row.integer(1)); });
+}
+
+ImageReader::ImageReader(const Database& database) {
+  if (!has_images(database)) return;
+  row_.emplace(database, "SELECT image, checksum FROM image WHERE place = ?1");
+}
+
+std::optional<std::vector<unsigned char>> ImageReader::read(std::int64_t place,
+                                                            const SessionFrame& at,
+                                                            Damage& damage) {
+  if (!row_) return std::nullopt;
+  row_->reset();
+  row_->bind(1, place);
+  const Statement::Step step = row_->step_if_readable();
+  std::optional<std::vector<unsigned char>> image;
+  if (step == Statement::Step::row) {
+    const auto bytes = row_->bytes(0);
+    if (has_checksum(*row_, 1, checksum_of_image(bytes, at))) {
+      image.emplace(bytes.begin(), bytes.end());
+    }
+  }
+  row_->reset();  // ends the read, so that the log can be emptied
+  if (!image && step != Statement::Step::end) {
+    damage.add(fmt::format("place {} (session {}, frame {}): its image differs from its checksum",
+                           place, at.session, at.frame));
+  }
+  return image;
+}
+
 RowWriter::RowWriter(const Database& database)
     : session_(database,
                "INSERT INTO session VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (session) "
                "DO UPDATE SET frames = ?7, checksum = ?8"),
       place_(database, "INSERT INTO place VALUES (?1, ?2, ?3, ?4, ?5, ?6)"),
       features_(database, "INSERT INTO features VALUES (?1, ?2, ?3)"),
+      image_(database, "INSERT INTO image VALUES (?1, ?2, ?3)"),
       loop_(database, "INSERT INTO loop VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)") {}
 
 void RowWriter::write(const MapSession& session) {
@@ -230,6 +271,15 @@ void RowWriter::write(const MapPlace& place, const Features& features) {
   features_.bind(3, checksum_of(place.at).add(bytes).value());
   features_.step();
   features_.reset();
+}
+
+void RowWriter::write_image(const MapPlace& place, std::span<const unsigned char> jpeg) {
+  if (jpeg.empty()) return;
+  image_.bind(1, place.id);
+  image_.bind(2, jpeg);
+  image_.bind(3, checksum_of_image(jpeg, place.at).value());
+  image_.step();
+  image_.reset();
 }
 
 void RowWriter::write(const MapLoop& loop) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <span>
 #include <string>
 #include <unordered_set>
 #include <vector>
@@ -41,6 +42,11 @@ std::vector<MapSession> read_sessions(const Database& database, Damage& damage);
 void for_each_place(const Database& database, const std::function<void(const MapPlace&)>& visit,
                     Damage& damage);
 
+/// Calls visit(place, bytes) for each image that is listed, whether or not it is whole, in order of
+/// place.
+void for_each_image(const Database& database,
+                    const std::function<void(std::int64_t, std::int64_t)>& visit, Damage& damage);
+
 std::vector<MapLoop> read_loops(const Database& database, Damage& damage);
 
 /// Reads features by place.
@@ -55,6 +61,19 @@ class FeatureReader {
   Statement row_;
 };
 
+/// Reads images by place.
+class ImageReader {
+ public:
+  explicit ImageReader(const Database& database);
+
+  /// None if none was kept, or, with a clause in `damage`, if it is damaged or another place's.
+  std::optional<std::vector<unsigned char>> read(std::int64_t place, const SessionFrame& at,
+                                                 Damage& damage);
+
+ private:
+  std::optional<Statement> row_;  ///< none in a map of a version without images
+};
+
 /// Writes rows within whatever transaction there is. Throws Error (kind output).
 class RowWriter {
  public:
@@ -63,12 +82,15 @@ class RowWriter {
   /// A session that is there is given the new number of frames.
   void write(const MapSession& session);
   void write(const MapPlace& place, const Features& features);
+  /// Nothing if there are no bytes.
+  void write_image(const MapPlace& place, std::span<const unsigned char> jpeg);
   void write(const MapLoop& loop);
 
  private:
   Statement session_;
   Statement place_;
   Statement features_;
+  Statement image_;
   Statement loop_;
 };
 

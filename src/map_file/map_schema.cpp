@@ -16,6 +16,7 @@ namespace {
 struct Table {
   const char* name;
   const char* definition;  ///< as SQLite keeps it
+  int since = 1;           ///< the version of maps that brought it
 };
 
 constexpr std::array kTables{
@@ -34,18 +35,14 @@ constexpr std::array kTables{
           "CREATE TABLE loop (loop INTEGER PRIMARY KEY, session INTEGER NOT NULL, frame INTEGER "
           "NOT NULL, match_session INTEGER NOT NULL, match_frame INTEGER NOT NULL, score REAL NOT "
           "NULL, similarity REAL NOT NULL, matches INTEGER NOT NULL, inliers INTEGER NOT NULL, "
-          "checksum INTEGER NOT NULL)"}};
+          "checksum INTEGER NOT NULL)"},
+    Table{"image",
+          "CREATE TABLE image (place INTEGER PRIMARY KEY, image BLOB NOT NULL, checksum INTEGER "
+          "NOT NULL)",
+          kFirstVersionWithImages}};
 
 /// SQLite makes it for AUTOINCREMENT.
 constexpr Table kSequences{"sqlite_sequence", "CREATE TABLE sqlite_sequence(name,seq)"};
-
-void create_tables(const Database& database) {
-  for (const Table& table : kTables) database.execute(table.definition);
-}
-
-/// Number i takes a map from version i to version i + 1; an empty file has version 0.
-using Migration = void (*)(const Database&);
-constexpr std::array<Migration, kMapVersion> kMigrations{create_tables};
 
 Database::Remedies remedies(const std::string& path) {
   return {.write =
@@ -61,24 +58,25 @@ Database::Remedies remedies(const std::string& path) {
 }
 
 /// A map has the tables of its version and no others: no view or trigger of a stranger is run.
-void check_tables(const Database& database) {
+void check_tables(const Database& database, int version) {
   Statement rows(database, "SELECT name, sql FROM sqlite_schema");
-  std::size_t known = 0;
+  std::ptrdiff_t known = 0;
   while (rows.step()) {
     const std::string name = rows.text(0);
     const std::string sql = rows.text(1);
     const auto is_this = [&](const Table& table) {
-      return name == table.name && sql == table.definition;
+      return table.since <= version && name == table.name && sql == table.definition;
     };
     if (!is_this(kSequences) && std::none_of(kTables.begin(), kTables.end(), is_this)) {
       refuse(database, fmt::format("has a table '{}' that no map of version {} has: it was changed "
                                    "by something else; use a copy from before",
-                                   name, kMapVersion));
+                                   name, version));
     }
     ++known;
   }
-  if (known != kTables.size() + 1)
-    refuse(database, "lacks tables of a map: use a copy from before");
+  const auto expected = std::count_if(kTables.begin(), kTables.end(),
+                                      [&](const Table& table) { return table.since <= version; });
+  if (known != expected + 1) refuse(database, "lacks tables of a map: use a copy from before");
 }
 
 /// The version of the map; 0 for an empty file.
@@ -99,23 +97,29 @@ int checked_version(const Database& database) {
   return static_cast<int>(version);
 }
 
-void migrate(const Database& database, int version) {
-  if (version == kMapVersion) return;
+/// Versions so far add tables; an empty file has version 0.
+void migrate(const Database& database, int from, int to) {
+  if (from >= to) return;
   database.execute("BEGIN IMMEDIATE");
-  for (auto i = static_cast<std::size_t>(version); i < kMigrations.size(); ++i) {
-    kMigrations[i](database);
+  for (const Table& table : kTables) {
+    if (table.since > from && table.since <= to) database.execute(table.definition);
   }
   database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}; COMMIT",
-                               kMapApplicationId, kMapVersion));
+                               kMapApplicationId, to));
 }
 
 }  // namespace
 
-Database open_map_for_writing(const std::string& path) {
+bool has_images(const Database& database) {
+  return database.integer("PRAGMA user_version") >= kFirstVersionWithImages;
+}
+
+Database open_map_for_writing(const std::string& path, int version) {
   Database database(path, Database::Access::create, remedies(path));
   database.execute(fmt::format("PRAGMA page_size = {}", kMapPageBytes));
-  migrate(database, checked_version(database));
-  check_tables(database);
+  const int found = checked_version(database);
+  if (found > 0) check_tables(database, found);
+  migrate(database, found, version);
   // Each commit is on disk when it returns (sqlite.org/wal.html, "Performance Considerations").
   database.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
   return database;
@@ -138,10 +142,9 @@ Database open_map_for_reading(const std::string& path) {
         fmt::format("There is no map '{}'; 'loopbit run INPUT --map {}' makes one.", path, path));
   }
   Database database(path, Database::Access::read, remedies(path));
-  if (checked_version(database) == 0) {
-    refuse(database, "is empty; 'loopbit run INPUT --map' fills it");
-  }
-  check_tables(database);
+  const int version = checked_version(database);
+  if (version == 0) refuse(database, "is empty; 'loopbit run INPUT --map' fills it");
+  check_tables(database, version);
   return database;
 }
 

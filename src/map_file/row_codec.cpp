@@ -9,7 +9,7 @@
 #include <cstring>
 #include <type_traits>
 
-#include <zlib.h>
+#include "crc32.hpp"
 
 namespace loopbit {
 namespace {
@@ -51,9 +51,7 @@ void copy_out(unsigned char*& bytes, const T* values, std::size_t number) {
 }  // namespace
 
 Checksum& Checksum::add(std::span<const unsigned char> bytes) {
-  value_ = static_cast<std::uint32_t>(
-      crc32_z(value_, bytes.empty() ? reinterpret_cast<const unsigned char*>("") : bytes.data(),
-              bytes.size()));
+  value_ = crc32_of(value_, bytes);
   return *this;
 }
 

@@ -2,8 +2,14 @@
 // SPDX-License-Identifier: MIT
 #include "block_counts.hpp"
 
+#include <bit>
+#include <cstring>
+#include <numeric>
+
 namespace loopbit {
 namespace {
+
+static_assert(std::endian::native == std::endian::little, "byte x of a row's word is block x");
 
 /// The number of set bits of each byte, in that byte.
 std::uint64_t bits_of_bytes(std::uint64_t word) {
@@ -22,19 +28,23 @@ BlockCounts block_counts(const BinaryContent& content) {
     for (std::size_t row = y * kHeight; row < (y + 1) * kHeight; ++row) {
       sums += bits_of_bytes(content.rows[row]);
     }
-    for (std::size_t x = 0; x < BlockCounts::kColumns; ++x) {
-      counts.of[y * BlockCounts::kColumns + x] = static_cast<std::uint8_t>(sums >> (8 * x));
-    }
+    std::memcpy(&counts.of[y * BlockCounts::kColumns], &sums, sizeof sums);
   }
   return counts;
+}
+
+int count(const BlockCounts& counts) {
+  return std::accumulate(counts.of.begin(), counts.of.end(), 0);
 }
 
 CoarseCounts coarse_counts(const BlockCounts& counts) {
   constexpr std::size_t kColumns = BlockCounts::kColumns;
   CoarseCounts coarse;
-  for (std::size_t i = 0; i < kCoarseCounts; ++i) {
-    const std::size_t upper = i / kColumns * 2 * kColumns + i % kColumns;
-    coarse.of[i] = static_cast<std::uint8_t>(counts.of[upper] + counts.of[upper + kColumns]);
+  for (std::size_t row = 0; row < kCoarseCounts; row += kColumns) {
+    const std::uint8_t* upper = &counts.of[2 * row];
+    for (std::size_t x = 0; x < kColumns; ++x) {
+      coarse.of[row + x] = static_cast<std::uint8_t>(upper[x] + upper[x + kColumns]);
+    }
   }
   return coarse;
 }

@@ -27,6 +27,8 @@ struct CoarseCounts {
 };
 
 [[nodiscard]] BlockCounts block_counts(const BinaryContent& content);
+/// |O| of the content that they are of.
+[[nodiscard]] int count(const BlockCounts& counts);
 [[nodiscard]] CoarseCounts coarse_counts(const BlockCounts& counts);
 
 /// Raises each of `maxima` to what `counts` has there.

@@ -30,10 +30,10 @@ PlaceId PlaceStore::add(const BinaryContent& content) {
   if (place % kChunkPlaces == 0) take_chunk(place / kChunkPlaces);
 
   const Chunk& chunk = chunks_[place / kChunkPlaces];
-  const auto set = static_cast<std::uint16_t>(loopbit::count(content));
   chunk.contents[place % kChunkPlaces] = content;
-  chunk.bounds->counts[place % kChunkPlaces] = set;
   const BlockCounts blocks = block_counts(content);
+  const auto set = static_cast<std::uint16_t>(loopbit::count(blocks));
+  chunk.bounds->counts[place % kChunkPlaces] = set;
   extend_stretches(place, {blocks, set});
   extend_coarse_stretch(place, {coarse_counts(blocks), set});
   size_.store(id + 1, std::memory_order_release);

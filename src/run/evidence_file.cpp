@@ -2,17 +2,15 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/evidence_file.hpp"
 
-#include <algorithm>
 #include <bit>
-#include <cmath>
 #include <cstring>
 #include <span>
 
 #include <fmt/format.h>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "loopbit/database.hpp"
+#include "loopbit/picture_jpeg.hpp"
 
 namespace loopbit {
 namespace {
@@ -23,7 +21,6 @@ static_assert(std::endian::native == std::endian::little, "the file's numbers ar
 static_assert(sizeof(PointPair) == 4 * sizeof(float));
 
 constexpr int kFramesPerTransaction = 32;
-constexpr int kJpegQuality = 75;
 constexpr int kFormatVersion = 1;
 
 Database open_evidence(const std::string& path, Database::Access access) {
@@ -32,26 +29,6 @@ Database open_evidence(const std::string& path, Database::Access access) {
           {.write = "check the free space and the permissions of its folder, or run without it, by "
                     "--no-report",
            .read = "it is damaged or no file of loopbit's; delete it to go on without it"}};
-}
-
-/// 8 bits, one channel or three.
-cv::Mat displayable(const cv::Mat& image) {
-  cv::Mat eight_bit = image;
-  if (image.depth() == CV_16U) image.convertTo(eight_bit, CV_8U, 1.0 / 257.0);
-  if (eight_bit.channels() == 4) cv::cvtColor(eight_bit, eight_bit, cv::COLOR_BGRA2BGR);
-  return eight_bit;
-}
-
-Bytes picture_jpeg(const cv::Mat& image) {
-  const double scale =
-      std::min(1.0, static_cast<double>(kPictureSide_px) / std::max(image.cols, image.rows));
-  cv::Mat small;
-  const cv::Size size(std::max(1, static_cast<int>(std::lround(image.cols * scale))),
-                      std::max(1, static_cast<int>(std::lround(image.rows * scale))));
-  cv::resize(displayable(image), small, size, 0, 0, cv::INTER_AREA);
-  Bytes bytes;
-  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
-  return bytes;
 }
 
 Bytes saliency_png(const cv::Mat1f& saliency) {

@@ -22,7 +22,8 @@ void remove_database(const std::string& path);
 
 /// A SQLite file. Every failure is an Error that names the file and a remedy; its kind is output
 /// where something could not be written, else input. What a file says is never trusted: a hostile
-/// one may give wrong rows, but runs no code and takes no more than 256 MiB for a row.
+/// one may give wrong rows, but runs no code and takes no more than 256 MiB for a row. For one
+/// thread at a time, with its statements.
 class Database {
  public:
   enum class Access {

@@ -5,6 +5,8 @@
 #include <functional>
 #include <memory>
 
+#include <opencv2/core.hpp>
+
 #include "loopbit/binary_content.hpp"
 #include "loopbit/detection.hpp"
 #include "loopbit/place_index.hpp"
@@ -37,10 +39,11 @@ class MapStorage {
   virtual std::shared_ptr<const Features> features(PlaceId place) = 0;
 
   /// Takes the next frame of this session, as number detection.frame. Where the detection is
-  /// `unreadable`, content and features are empty, and nothing but its number is kept. Throws Error
-  /// (kind output) if this frame, or one before, could not be kept.
+  /// `unreadable`, content, features and image are empty, and nothing but its number is kept. The
+  /// image is what the detector was given: it may be overwritten afterwards. Throws Error (kind
+  /// output) if this frame, or one before, could not be kept.
   virtual void add(const Detection& detection, const BinaryContent& content,
-                   std::shared_ptr<const Features> features) = 0;
+                   std::shared_ptr<const Features> features, const cv::Mat& image) = 0;
 };
 
 }  // namespace loopbit

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include <opencv2/core.hpp>
+
 #include "loopbit/binary_content.hpp"
 #include "loopbit/detection.hpp"
 #include "loopbit/loop_detector_options.hpp"
@@ -49,6 +51,15 @@ struct MapLoop {
   bool operator==(const MapLoop&) const = default;
 };
 
+/// How many places of a map have an image, and what the images take.
+struct MapImages {
+  std::int64_t number = 0;
+  std::int64_t bytes = 0;
+};
+
+/// Makes the bytes of a small JPEG file of an image; see picture_jpeg.hpp.
+using EncodeImage = std::function<std::vector<unsigned char>(const cv::Mat&)>;
+
 /// Features that were read lately are kept up to this many bytes, some 5,000 places.
 inline constexpr std::size_t kFeatureCacheBytes = std::size_t{256} << 20U;
 
@@ -84,6 +95,12 @@ class MapReader : public MapStorage {
   /// None if they are lost.
   [[nodiscard]] std::optional<Features> features_of(const MapPlace& place);
 
+  /// Those that the map lists, damaged or not. A microsecond an image.
+  [[nodiscard]] MapImages images();
+
+  /// The bytes of a JPEG file. None if none was kept, or if it is lost, which damage() then says.
+  [[nodiscard]] std::optional<std::vector<unsigned char>> image_of(const MapPlace& place);
+
   /// One clause for each thing found damaged so far, such as "place 7 (session 1, frame 6): its
   /// content differs from its checksum".
   [[nodiscard]] const std::vector<std::string>& damage() const;
@@ -98,7 +115,7 @@ class MapReader : public MapStorage {
   void for_each_earlier_loop(const VisitLoop& visit) override;
   std::shared_ptr<const Features> features(PlaceId place) override;
   void add(const Detection& detection, const BinaryContent& content,
-           std::shared_ptr<const Features> features) override;
+           std::shared_ptr<const Features> features, const cv::Mat& image) override;
 
  private:
   struct Impl;
@@ -117,7 +134,12 @@ class MapWriter : public MapStorage {
   /// (kind output) if the map has a writer or cannot be written, (kind option) if it was made with
   /// other settings of binary_content or surf, (kind input) as MapReader does. A session without
   /// frames leaves no trace.
-  MapWriter(const std::string& path, const LoopDetectorOptions& options, const std::string& name);
+  ///
+  /// `encode_image`: if given, an image of each place is kept. It is called on that thread, with a
+  /// copy of the image as halved_to_picture() makes it, which costs add() some 0.1 ms; nothing is
+  /// kept where it gives no bytes, and what it throws, later calls throw.
+  MapWriter(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
+            EncodeImage encode_image = {});
   /// Saves as finish() does, if it was not called, and swallows its error.
   ~MapWriter() override;
   MapWriter(const MapWriter&) = delete;
@@ -144,7 +166,7 @@ class MapWriter : public MapStorage {
   void for_each_earlier_loop(const VisitLoop& visit) override;
   std::shared_ptr<const Features> features(PlaceId place) override;
   void add(const Detection& detection, const BinaryContent& content,
-           std::shared_ptr<const Features> features) override;
+           std::shared_ptr<const Features> features, const cv::Mat& image) override;
 
  private:
   class Impl;

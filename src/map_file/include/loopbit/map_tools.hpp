@@ -15,6 +15,7 @@ struct MapCheck {
   std::int64_t sessions = 0;
   std::int64_t places = 0;  ///< whole, with their features
   std::int64_t loops = 0;
+  std::int64_t images = 0;               ///< whole
   std::vector<std::string> damage = {};  ///< a clause a thing; empty if all is well
 };
 
@@ -35,13 +36,15 @@ struct MergeCounts {
 MergeCounts merge_map(const std::string& into, const std::string& from);
 
 /// Copies what is whole of a damaged map to a new one, under the same numbers. A session whose
-/// description is lost is called "recovered". Throws Error: kind output if `to` exists or cannot be
-/// written, input if not even the tables can be found.
+/// description is lost is called "recovered". A map that version 1 began loses its images with its
+/// first page. Throws Error: kind output if `to` exists or cannot be written, input if not even the
+/// tables can be found.
 MapCheck recover_map(const std::string& from, const std::string& to);
 
 struct CompactOptions {
   std::vector<int> drop_sessions;  ///< with their places and loops
   std::int64_t max_places = 0;     ///< the least missed are removed beyond that; 0 = none
+  bool drop_images = false;        ///< all of them; places stay
 };
 
 struct CompactCounts {
@@ -51,10 +54,10 @@ struct CompactCounts {
   std::uintmax_t bytes_after = 0;
 };
 
-/// Forgets sessions and redundant places, and gives their space back. The new file replaces the old
-/// one in one step, so that no crash leaves half of it; it needs room for both. Throws Error: kind
-/// option for a session that is not there; output if the map is read or written by others, or
-/// cannot be written; input if it is damaged.
+/// Forgets sessions, redundant places and images, and gives their space back. The new file replaces
+/// the old one in one step, so that no crash leaves half of it; it needs room for both. Throws
+/// Error: kind option for a session that is not there; output if the map is read or written by
+/// others, or cannot be written; input if it is damaged.
 CompactCounts compact_map(const std::string& path, const CompactOptions& options);
 
 enum class ExportFormat { csv, json, g2o };

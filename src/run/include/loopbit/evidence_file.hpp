@@ -16,13 +16,11 @@ namespace loopbit {
 
 /// What a frame looked like and what its answer rests on, as kept for people.
 struct StoredEvidence {
-  std::vector<unsigned char> picture_jpeg;  ///< long side kPictureSide_px
+  std::vector<unsigned char> picture_jpeg;  ///< as picture_jpeg() makes it
   std::vector<unsigned char> saliency_png;  ///< 64 x 64, 8 bits; 255 = the map's largest value
   BinaryContent content;
   std::vector<PointPair> inliers;
 };
-
-inline constexpr int kPictureSide_px = 256;
 
 /// Writes evidence.db, a SQLite file with a row a frame; see docs/run_folder.md. After a crash it
 /// opens with all but the last second's frames or so. Throws Error (kind output). About 10 KB and 1

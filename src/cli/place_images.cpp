@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "place_images.hpp"
+
+#include <filesystem>
+#include <string_view>
+#include <system_error>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/write_file.hpp"
+
+namespace loopbit::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+void make_empty_folder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  const bool is_empty = !error && fs::is_empty(folder, error);
+  if (error) throw cannot_write(folder, error.value());
+  if (!is_empty) {
+    throw Error(
+        ErrorKind::output,
+        fmt::format("'{}' has files, which images might replace; name a new folder.", folder));
+  }
+}
+
+}  // namespace
+
+PlaceImages::PlaceImages(MapReader& map, const std::string& folder) : map_(map), folder_(folder) {
+  make_empty_folder(folder);
+  map.for_each_place([&](const MapPlace& place) {
+    images_[{place.at.session, place.at.frame}].id = place.id;
+  });
+}
+
+std::string PlaceImages::file_of(const SessionFrame& at) {
+  const auto found = images_.find({at.session, at.frame});
+  return found == images_.end() ? "" : file_of(at, found->second);
+}
+
+const std::string& PlaceImages::file_of(const SessionFrame& at, PlaceImage& image) {
+  if (std::exchange(image.is_known, true)) return image.file;
+  if (const auto jpeg = map_.image_of({.id = image.id, .at = at})) {
+    image.file = (fs::path(folder_) / fmt::format("{}_{:06}.jpg", at.session, at.frame)).string();
+    write_file(image.file, {reinterpret_cast<const char*>(jpeg->data()), jpeg->size()});
+  }
+  return image.file;
+}
+
+std::size_t PlaceImages::write_all() {
+  std::size_t written = 0;
+  for (auto& [at, image] : images_) written += !file_of({at.first, at.second}, image).empty();
+  return written;
+}
+
+}  // namespace loopbit::cli

@@ -1,0 +1,110 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+// A map is written by two threads, the detector's and its own, while others read the file. For the
+// thread sanitizer; links the detector only, so that it is built quickly.
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "loopbit/loop_detector.hpp"
+#include "loopbit/map_file.hpp"
+#include "loopbit/map_tools.hpp"
+
+#include "batch_writer.hpp"
+#include "map_schema.hpp"
+#include "map_support.hpp"
+#include "test_support.hpp"
+
+namespace loopbit::test {
+namespace {
+
+/// One pixel of the image: all that is needed to tell it.
+std::vector<unsigned char> first_pixel(const cv::Mat& image) { return {image.at<uchar>(0, 0)}; }
+
+/// Reads the whole map again and again; every place that was saved must be there, whole.
+void read_until(const std::atomic<bool>& is_done, const std::string& path, const MapWriter& writer,
+                std::size_t earlier_places) {
+  do {
+    const auto saved = static_cast<std::size_t>(writer.saved_frames());
+    MapReader map(path);
+    std::size_t places = 0;
+    map.for_each_place([&](const MapPlace& place) {
+      ++places;
+      EXPECT_TRUE(map.features_of(place).has_value());
+      EXPECT_TRUE(map.image_of(place).has_value());
+    });
+    EXPECT_GE(places, earlier_places + saved);
+    EXPECT_TRUE(map.damage().empty());
+    EXPECT_EQ(check_map(path).damage, std::vector<std::string>{});
+  } while (!is_done);
+}
+
+class MapThreads : public ScratchTest {};
+
+TEST_F(MapThreads, ADetectorAddsWhileReadersReadTheFile) {
+  constexpr int kScenes = 12;
+  constexpr std::size_t kReaders = 2;
+  const std::string map_path = path("map.db");
+  const auto drive = [](LoopDetector& detector, MapWriter& map) {
+    int loops = 0;
+    for (int scene = 0; scene < kScenes; ++scene) {
+      loops += detector.process(view(scene)).status == Status::loop;
+      if (scene % 5 == 4) map.flush();
+    }
+    return loops;
+  };
+  {
+    const auto map = std::make_shared<MapWriter>(map_path, fast_options(), "first", first_pixel);
+    LoopDetector detector(fast_options(), map);
+    drive(detector, *map);
+    map->finish();
+  }
+  const auto map = std::make_shared<MapWriter>(map_path, fast_options(), "second", first_pixel);
+  LoopDetector detector(fast_options(), map);
+  std::atomic<bool> is_done = false;
+  std::vector<std::thread> readers;
+  readers.reserve(kReaders);
+  for (std::size_t i = 0; i < kReaders; ++i) {
+    readers.emplace_back([&] { read_until(is_done, map_path, *map, kScenes); });
+  }
+  EXPECT_GT(drive(detector, *map), kScenes / 2);
+  map->finish();
+  is_done = true;
+  for (std::thread& reader : readers) reader.join();
+  EXPECT_EQ(places_of(map_path).size(), std::size_t{2} * kScenes);
+}
+
+TEST_F(MapThreads, PendingFeaturesAreGivenWhileTheyAreCommitted) {
+  constexpr int kFrames = 400;
+  const std::string map_path = path("map.db");
+  MapSession session;
+  session.session = 1;
+  BatchWriter writer(open_map_for_writing(map_path), std::move(session), 1, {});
+  std::vector<std::shared_ptr<const Features>> added;
+  int pending = 0;
+  for (int frame = 0; frame < kFrames; ++frame) {
+    added.push_back(std::make_shared<const Features>(few_features(frame)));
+    writer.add(
+        {.content = content_of(frame), .detection = {.frame = frame}, .features = added.back()});
+    const int earlier = frame - frame % 20;
+    if (const auto found = writer.pending(earlier)) {
+      ++pending;
+      ASSERT_EQ(found, added[static_cast<std::size_t>(earlier)]);
+    } else {
+      ASSERT_GT(writer.saved_frames(), earlier);
+    }
+  }
+  writer.flush();
+  EXPECT_GT(pending, 0);
+  EXPECT_EQ(writer.pending(kFrames - 1), nullptr);
+  EXPECT_EQ(writer.saved_frames(), kFrames);
+  EXPECT_EQ(places_of(map_path).size(), std::size_t{kFrames});
+}
+
+}  // namespace
+}  // namespace loopbit::test
