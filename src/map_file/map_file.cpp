@@ -116,13 +116,15 @@ void MapReader::add(const Detection& /*detection*/, const BinaryContent& /*conte
 class MapWriter::Impl {
  public:
   Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name)
-      : lock_(path), writer_(begin_session(path, options, name)) {}
+      : lock_(std::in_place, path), writer_(begin_session(path, options, name)) {}
 
   void finish() {
+    if (!lock_) return;
     writer_->flush();
     stored_.reset();
     database_.reset();
     writer_->close_log();
+    lock_.reset();
   }
 
   void for_each_earlier_place(const Visit& visit) {
@@ -195,7 +197,7 @@ class MapWriter::Impl {
 
   [[nodiscard]] PlaceId session_begin() { return stored().size() - frames_; }
 
-  WriterLock lock_;
+  std::optional<WriterLock> lock_;  ///< gone after finish(): others may write
   int session_ = 0;
   std::int64_t first_place_ = 0;
   PlaceId frames_ = 0;                ///< of this session
