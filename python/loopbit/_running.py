@@ -29,6 +29,8 @@ _DETECTION = numpy.dtype(
         ("timestamp_s", "f8"),
         ("status", "U16"),
         ("match", "i4"),
+        ("earlier_session", "i4"),
+        ("earlier_frame", "i4"),
         ("score", "f8"),
         ("similarity", "f8"),
         ("matches", "i4"),
@@ -42,14 +44,17 @@ _DETECTION = numpy.dtype(
 
 
 def detections_array(detections: Iterable[Detection]) -> numpy.typing.NDArray[Any]:
-    """Detections as a structured array with the columns of loops.csv; timestamp_s is nan and match
-    -1 where there is none."""
+    """Detections as a structured array with the columns of loops.csv, where a match with an earlier
+    session of a map is two: earlier_session and earlier_frame. timestamp_s is nan, match and
+    earlier_frame are -1, and earlier_session is 0 where there is none."""
     rows = [
         (
             d.frame,
             numpy.nan if d.timestamp_s is None else d.timestamp_s,
             d.status.name,
             -1 if d.match is None else d.match,
+            0 if d.earlier_match is None else d.earlier_match.session,
+            -1 if d.earlier_match is None else d.earlier_match.frame,
             d.score,
             d.similarity,
             d.matches,
