@@ -90,9 +90,10 @@ def run(
 
 def run_folder(
     source: ImageSource | Path,
-    out: Path,
+    out: Path | None = None,
     options: LoopDetectorOptions | None = None,
     *,
+    map: Path | None = None,
     truth: GroundTruth | Path | None = None,
     protocol: str = "",
     positions_m: numpy.typing.ArrayLike | Path | None = None,
@@ -103,6 +104,8 @@ def run_folder(
     """Runs a new detector and leaves a run folder, as the command 'loopbit run' does: loops.csv,
     run.json, with evidence also what the frames looked like, for write_report().
 
+    map: a map to continue with a session, made if there is none; places of earlier sessions are
+    recognised, too. Without out, the folder is beside it: town_session_2 for session 2 of town.db.
     truth: as read_truth() gives it, in the numbers of the frames read, or its path, where all
     frames are read. positions_m: camera centres, one a frame, nan where not known, or a file of
     poses; a truth by poses gives them, too.
@@ -119,10 +122,10 @@ def run_folder(
             positions_m = truth
     tolerance = _loopbit.find_protocol(protocol).tolerance_frames if protocol else 0
     options = LoopDetectorOptions() if options is None else options
-    recorded = _loopbit._RecordedRun(source, out, options, overwrite, evidence)
+    recorded = _loopbit._RecordedRun(source, out or "", options, map or "", overwrite)
     stopped_by = "end"
     try:
-        recorded.detect(on_bad_frame)
+        recorded.detect(source, on_bad_frame, evidence)
         if isinstance(truth, (str, os.PathLike)):
             truth = read_truth(truth, protocol=protocol, times_s=recorded.times_s)
         if truth is not None:
@@ -136,7 +139,7 @@ def run_folder(
         raise
     finally:
         recorded.finish(stopped_by)
-    return _loopbit.read_run(out)
+    return _loopbit.read_run(recorded.path)
 
 
 def write_report(run: FinishedRun | Path, path: Path | None = None) -> str:

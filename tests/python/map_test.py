@@ -285,3 +285,35 @@ def test_damage_is_named_and_what_is_whole_recovered(town, tmp_path):
     saved = loopbit.recover_map(town, tmp_path / "saved.db")
     assert saved.damage == map.damage
     assert loopbit.check_map(tmp_path / "saved.db").damage == []
+
+
+def test_run_folder_continues_a_map_as_the_command(command, laps, tmp_path):
+    for side in ("python", "command"):
+        (tmp_path / side).mkdir()
+    for lap in laps:
+        command("run", lap, "--map", tmp_path / "command/town.db", "--no-report")
+        run = loopbit.run_folder(lap, map=tmp_path / "python/town.db", evidence=False)
+    assert run.path == str(tmp_path / "python/town_session_2")
+    assert decisions(run.path) == decisions(tmp_path / "command/town_session_2")
+    assert json.loads(run.record_json)["map"] == {"path": str(tmp_path / "python/town.db"),
+                                                  "session": 2}
+    places = [loopbit.MapReader(tmp_path / side / "town.db").places().tobytes()
+              for side in ("python", "command")]
+    assert places[0] == places[1]
+    with pytest.raises(loopbit.OptionError, match="where to keep the run"):
+        loopbit.run_folder(laps[0])
+
+
+def test_a_run_that_is_stopped_keeps_what_its_map_has(laps, tmp_path):
+    folder = tmp_path / "images"
+    shutil.copytree(laps[0], folder)
+    (folder / "000010.png").write_bytes(b"no image")
+    path = tmp_path / "town.db"
+    try:
+        loopbit.run_folder(folder, map=path, on_bad_frame=lambda sentence: 1 / 0)
+    except ZeroDivisionError:
+        # Though the traceback holds all that was running.
+        loopbit.MapWriter(path, loopbit.LoopDetectorOptions(), "next").finish()
+        assert len(loopbit.MapReader(path).places()) == 10
+    else:
+        pytest.fail("the run was not stopped")
