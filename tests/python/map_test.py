@@ -49,19 +49,25 @@ def made(images, tmp_path_factory):
     return path, record(path, images[LAP:], "second lap")
 
 
+@pytest.fixture(scope="module")
+def commanded(command, laps, tmp_path_factory):
+    """The map that the command makes of the laps."""
+    path = tmp_path_factory.mktemp("commanded") / "town.db"
+    for lap in laps:
+        command("run", lap, "--map", path, "--no-report")
+    return path
+
+
 @pytest.fixture
 def town(made, tmp_path):
     """A copy of the map, to be changed."""
     return shutil.copy(made[0], tmp_path / "town.db")
 
 
-def test_a_map_is_that_of_the_command(command, made, laps, tmp_path):
+def test_a_map_is_that_of_the_command(command, made, commanded):
     path, found = made
-    theirs = tmp_path / "command.db"
-    for lap in laps:
-        command("run", lap, "--map", theirs, "--no-report")
-    assert list(map(as_row, found)) == decisions(tmp_path / "command_session_2")
-    ours, other = loopbit.MapReader(path), loopbit.MapReader(str(theirs))
+    assert list(map(as_row, found)) == decisions(commanded.parent / "town_session_2")
+    ours, other = loopbit.MapReader(path), loopbit.MapReader(str(commanded))
     assert ours.places().tobytes() == other.places().tobytes()
     assert ours.loops().tobytes() == other.loops().tobytes()
     assert "damaged" not in command("map", "check", path)
@@ -72,7 +78,7 @@ def test_a_map_is_that_of_the_command(command, made, laps, tmp_path):
     for format in loopbit.ExportFormat.__members__.values():
         if format != loopbit.ExportFormat.json:    # which has names and times
             assert loopbit.export_loops(ours, format) == command(
-                "map", "export", theirs, "--format", format.name)
+                "map", "export", commanded, "--format", format.name)
 
 
 def test_answers_are_those_of_the_command(command, made, laps):
@@ -287,19 +293,15 @@ def test_damage_is_named_and_what_is_whole_recovered(town, tmp_path):
     assert loopbit.check_map(tmp_path / "saved.db").damage == []
 
 
-def test_run_folder_continues_a_map_as_the_command(command, laps, tmp_path):
-    for side in ("python", "command"):
-        (tmp_path / side).mkdir()
+def test_run_folder_continues_a_map_as_the_command(commanded, laps, tmp_path):
+    path = tmp_path / "town.db"
     for lap in laps:
-        command("run", lap, "--map", tmp_path / "command/town.db", "--no-report")
-        run = loopbit.run_folder(lap, map=tmp_path / "python/town.db", evidence=False)
-    assert run.path == str(tmp_path / "python/town_session_2")
-    assert decisions(run.path) == decisions(tmp_path / "command/town_session_2")
-    assert json.loads(run.record_json)["map"] == {"path": str(tmp_path / "python/town.db"),
-                                                  "session": 2}
-    places = [loopbit.MapReader(tmp_path / side / "town.db").places().tobytes()
-              for side in ("python", "command")]
-    assert places[0] == places[1]
+        run = loopbit.run_folder(lap, map=path, evidence=False)
+    assert run.path == str(tmp_path / "town_session_2")
+    assert decisions(run.path) == decisions(commanded.parent / "town_session_2")
+    assert json.loads(run.record_json)["map"] == {"path": str(path), "session": 2}
+    ours, theirs = (loopbit.MapReader(map).places().tobytes() for map in (path, commanded))
+    assert ours == theirs
     with pytest.raises(loopbit.OptionError, match="where to keep the run"):
         loopbit.run_folder(laps[0])
 
