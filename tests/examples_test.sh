@@ -31,3 +31,13 @@ for name in precision_recall times similarity trajectory; do
   [[ $(head -c 4 "$scratch/figures/$name.pdf") == %PDF ]]
 done
 test -s "$scratch/figures/report.html"
+
+# The first lap is the map, and every tenth image of the second asks it.
+"$prefix/bin/loopbit" run "$scratch/town/images" --map "$scratch/town.db" --limit 75 --no-report \
+  2>"$scratch/progress"
+mkdir "$scratch/second_lap"
+cp "$scratch"/town/images/000{08,09,10,11,12,13,14}0.png "$scratch/second_lap"
+"$scratch/build/relocalise" "$scratch/town.db" "$scratch/second_lap" | tee "$scratch/places"
+"$python" "$examples/relocalise.py" "$scratch/town.db" "$scratch/second_lap" | cmp - "$scratch/places"
+asked=$("$prefix/bin/loopbit" query "$scratch/town.db" "$scratch/second_lap" --places 1)
+[[ $(grep -c ' is frame [0-9]* of session 1, score' "$scratch/places") == $(grep -c ' loop ' <<<"$asked") ]]

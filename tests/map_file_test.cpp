@@ -56,6 +56,17 @@ TEST_F(MapFile, AFinishedSessionTakesNothingMore) {
   EXPECT_EQ(places_of(map_path_).size(), 1U);
 }
 
+TEST_F(MapFile, AFinishedSessionLetsOthersWrite) {
+  MapWriter first(map_path_, fast_options(), "first");
+  add_frame(first, 0);
+  first.finish();
+  MapWriter second(map_path_, fast_options(), "second");
+  EXPECT_EQ(second.session(), 2);
+  first.finish();
+  expect_error(ErrorKind::output, {"being written"},
+               [&] { const MapWriter third(map_path_, fast_options(), "third"); });
+}
+
 TEST_F(MapFile, KeepsSessionsAndLoopsApart) {
   add_session(map_path_, 5, "first");
   add_session(map_path_, 6, "second", SessionFrame{1, 4});

@@ -29,6 +29,8 @@ _DETECTION = numpy.dtype(
         ("timestamp_s", "f8"),
         ("status", "U16"),
         ("match", "i4"),
+        ("earlier_session", "i4"),
+        ("earlier_frame", "i4"),
         ("score", "f8"),
         ("similarity", "f8"),
         ("matches", "i4"),
@@ -42,14 +44,17 @@ _DETECTION = numpy.dtype(
 
 
 def detections_array(detections: Iterable[Detection]) -> numpy.typing.NDArray[Any]:
-    """Detections as a structured array with the columns of loops.csv; timestamp_s is nan and match
-    -1 where there is none."""
+    """Detections as a structured array with the columns of loops.csv, where a match with an earlier
+    session of a map is two: earlier_session and earlier_frame. timestamp_s is nan, match and
+    earlier_frame are -1, and earlier_session is 0 where there is none."""
     rows = [
         (
             d.frame,
             numpy.nan if d.timestamp_s is None else d.timestamp_s,
             d.status.name,
             -1 if d.match is None else d.match,
+            0 if d.earlier_match is None else d.earlier_match.session,
+            -1 if d.earlier_match is None else d.earlier_match.frame,
             d.score,
             d.similarity,
             d.matches,
@@ -85,12 +90,14 @@ def run(
 
 def run_folder(
     source: ImageSource | Path,
-    out: Path,
+    out: Path | None = None,
     options: LoopDetectorOptions | None = None,
     *,
+    map: Path | None = None,
     truth: GroundTruth | Path | None = None,
     protocol: str = "",
     positions_m: numpy.typing.ArrayLike | Path | None = None,
+    keep_images: bool = False,
     overwrite: bool = False,
     evidence: bool = True,
     on_bad_frame: Callable[[str], None] = warnings.warn,
@@ -98,6 +105,8 @@ def run_folder(
     """Runs a new detector and leaves a run folder, as the command 'loopbit run' does: loops.csv,
     run.json, with evidence also what the frames looked like, for write_report().
 
+    map: a map to continue with a session, made if there is none; places of earlier sessions are
+    recognised, too; keep_images: with a small JPEG of each place. Without out, the folder is beside it: town_session_2 for session 2 of town.db.
     truth: as read_truth() gives it, in the numbers of the frames read, or its path, where all
     frames are read. positions_m: camera centres, one a frame, nan where not known, or a file of
     poses; a truth by poses gives them, too.
@@ -114,10 +123,12 @@ def run_folder(
             positions_m = truth
     tolerance = _loopbit.find_protocol(protocol).tolerance_frames if protocol else 0
     options = LoopDetectorOptions() if options is None else options
-    recorded = _loopbit._RecordedRun(source, out, options, overwrite, evidence)
+    recorded = _loopbit._RecordedRun(
+        source, out or "", options, map or "", overwrite, keep_images
+    )
     stopped_by = "end"
     try:
-        recorded.detect(on_bad_frame)
+        recorded.detect(source, on_bad_frame, evidence)
         if isinstance(truth, (str, os.PathLike)):
             truth = read_truth(truth, protocol=protocol, times_s=recorded.times_s)
         if truth is not None:
@@ -131,7 +142,7 @@ def run_folder(
         raise
     finally:
         recorded.finish(stopped_by)
-    return _loopbit.read_run(out)
+    return _loopbit.read_run(recorded.path)
 
 
 def write_report(run: FinishedRun | Path, path: Path | None = None) -> str:

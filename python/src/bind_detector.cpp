@@ -9,8 +9,32 @@
 #include <fmt/format.h>
 #include <pybind11/stl.h>
 
+#include "loopbit/error.hpp"
+
 #include "bindings.hpp"
 #include "numpy_image.hpp"
+#include "settings.hpp"
+
+namespace loopbit::python {
+namespace {
+
+/// A list that query() fills.
+class Ranking : public pybind11::list {
+ public:
+  PYBIND11_OBJECT_DEFAULT(Ranking, pybind11::list, PyList_Check)
+};
+
+}  // namespace
+}  // namespace loopbit::python
+
+namespace pybind11::detail {
+
+template <>
+struct handle_type_name<loopbit::python::Ranking> {
+  static constexpr auto name = const_name("list[loopbit.RankedPlace]");  // NOLINT: pybind11's name
+};
+
+}  // namespace pybind11::detail
 
 namespace loopbit::python {
 namespace {
@@ -25,10 +49,40 @@ struct FreeAndLocked {
   std::scoped_lock<std::recursive_mutex> lock;
 };
 
+/// Throws Error unless a section of the settings is what a map was made with.
+template <typename Part>
+void check_same(const char* section, const Part& map, const Part& detector) {
+  for_each_field<Part>([&](const auto& field) {
+    const auto ours = detector.*field.member;
+    const auto theirs = map.*field.member;
+    if (ours == theirs) return;
+    throw Error(ErrorKind::option,
+                fmt::format("{0}.{1} is {2}, but the map was made with {0}.{1} = {3}; give the "
+                            "detector the options of the map, or none.",
+                            section, field.name, ours, theirs));
+  });
+}
+
+LoopDetectorOptions options_for(const std::optional<LoopDetectorOptions>& options,
+                                const SharedMap* map) {
+  const auto of_map = map ? map->options() : std::nullopt;
+  if (!options) return of_map.value_or(LoopDetectorOptions{});
+  if (of_map) {
+    check_same("binary_content", of_map->binary_content, options->binary_content);
+    check_same("surf", of_map->surf, options->surf);
+  }
+  return *options;
+}
+
 std::string detection_text(const Detection& d) {
   std::string text = fmt::format("Detection(frame={}, status={}", d.frame, to_string(d.status));
-  if (d.match) text += fmt::format(", match={}, score={:.1f}", *d.match, d.score);
-  if (d.match) text += fmt::format(", similarity={:.3f}, inliers={}", d.similarity, d.inliers);
+  if (d.match) text += fmt::format(", match={}", *d.match);
+  if (d.earlier_match)
+    text += fmt::format(", earlier_match={}", literal(py::cast(*d.earlier_match)));
+  if (d.match || d.earlier_match) {
+    text += fmt::format(", score={:.1f}, similarity={:.3f}, inliers={}", d.score, d.similarity,
+                        d.inliers);
+  }
   return text + ")";
 }
 
@@ -53,7 +107,10 @@ void bind_detection(py::module_& module) {
       .def_readonly("frame", &Detection::frame, "The frame's number, from 0.")
       .def_readonly("timestamp_s", &Detection::timestamp_s, "As it was given.")
       .def_readonly("status", &Detection::status, "Why it is a loop, or why not.")
-      .def_readonly("match", &Detection::match, "The best candidate, accepted or not, or None.")
+      .def_readonly("match", &Detection::match,
+                    "The best candidate, accepted or not, or None; a frame of this session.")
+      .def_readonly("earlier_match", &Detection::earlier_match,
+                    "The same, where it is a frame of an earlier session of the map.")
       .def_readonly("score", &Detection::score, "What was compared with decision.min_score.")
       .def_readonly("similarity", &Detection::similarity, "xi of frame and match.")
       .def_readonly("matches", &Detection::matches, "Features shared, one to one.")
@@ -63,6 +120,32 @@ void bind_detection(py::module_& module) {
           "is_loop", [](const Detection& self) { return self.status == Status::loop; },
           "Whether the match is accepted.")
       .def("__repr__", &detection_text);
+}
+
+void bind_ranked_place(py::module_& module) {
+  py::class_<RankedPlace>(module, "RankedPlace",
+                          "A place that an image may show, with the numbers behind it.")
+      .def_readonly("place", &RankedPlace::place, "Session 0 is the detector's own.")
+      .def_readonly("score", &RankedPlace::score)
+      .def_readonly("similarity", &RankedPlace::similarity)
+      .def_readonly("matches", &RankedPlace::matches)
+      .def_readonly("inliers", &RankedPlace::inliers)
+      .def("__repr__", [](const RankedPlace& self) {
+        return fmt::format("RankedPlace({}, score={:.1f}, similarity={:.3f}, inliers={})",
+                           literal(py::cast(self.place)), self.score, self.similarity,
+                           self.inliers);
+      });
+}
+
+/// SharedDetector::query, and where a list is given, its new contents.
+Detection query(const SharedDetector& detector, ImageArgument image,
+                std::optional<double> timestamp_s, std::optional<Ranking> ranking) {
+  if (!ranking) return detector.query(std::move(image), timestamp_s, nullptr);
+  std::vector<RankedPlace> places;
+  const Detection detection = detector.query(std::move(image), timestamp_s, &places);
+  ranking->attr("clear")();
+  for (const RankedPlace& place : places) ranking->append(place);
+  return detection;
 }
 
 /// A row of Evidence.inliers.
@@ -98,6 +181,10 @@ void bind_evidence(py::module_& module) {
 
 }  // namespace
 
+SharedDetector::SharedDetector(const std::optional<LoopDetectorOptions>& options,
+                               const std::shared_ptr<SharedMap>& map)
+    : detector_(options_for(options, map.get()), map) {}
+
 Detection SharedDetector::process(ImageArgument image, std::optional<double> timestamp_s,
                                   Evidence* evidence) {
   const cv::Mat pixels = to_image(image, "image");
@@ -112,10 +199,11 @@ Detection SharedDetector::process(ImageArgument image, std::optional<double> tim
   return detection;
 }
 
-Detection SharedDetector::query(ImageArgument image, std::optional<double> timestamp_s) const {
+Detection SharedDetector::query(ImageArgument image, std::optional<double> timestamp_s,
+                                std::vector<RankedPlace>* ranking) const {
   const cv::Mat pixels = to_image(image, "image");
   const FreeAndLocked guard(mutex_);
-  return detector_.query(pixels, timestamp_s);
+  return detector_.query(pixels, timestamp_s, ranking);
 }
 
 Detection SharedDetector::skip(std::optional<double> timestamp_s) {
@@ -135,20 +223,30 @@ LoopDetectorOptions SharedDetector::options() const {
 
 void bind_detector(py::module_& module) {
   bind_detection(module);
+  bind_ranked_place(module);
   bind_evidence(module);
   py::class_<SharedDetector>(
       module, "LoopDetector",
       "Tells for each camera image whether the camera has been at this place before. Several "
       "threads may share one; it works for one at a time, without the GIL.")
-      .def(py::init<const LoopDetectorOptions&>(),
-           py::arg_v("options", LoopDetectorOptions{}, "LoopDetectorOptions()"))
+      .def(py::init<const std::optional<LoopDetectorOptions>&, const std::shared_ptr<SharedMap>&>(),
+           py::arg("options") = py::none(), py::arg("map") = py::none(),
+           py::call_guard<py::gil_scoped_release>(),
+           "Without options, those of the map, or the defaults. With a map, all places of its "
+           "sessions are candidates, whatever the exclusion window; a MapWriter is continued with "
+           "what is processed, a MapReader only asked. A map serves one detector. Raises "
+           "OptionError if the map was made with other settings of binary_content or surf.")
       .def("process", &SharedDetector::process, py::arg("image"),
            py::arg("timestamp_s") = py::none(), py::arg("evidence") = py::none(),
            "Detects, then adds the image as the next place. The image: uint8 or uint16, (h, w), or "
            "BGR or BGRA, at least 32 x 32; not copied where its rows are contiguous. The time: not "
            "before the last one. The evidence, if given, is filled.")
-      .def("query", &SharedDetector::query, py::arg("image"), py::arg("timestamp_s") = py::none(),
-           "What process() would answer now, without adding anything.")
+      .def(
+          "query", &query, py::arg("image"), py::arg("timestamp_s") = py::none(),
+          py::arg("ranking") = py::none(),
+          "What process() would answer now, without adding anything. The ranking, if given, is "
+          "filled with all candidates, best first, at the cost of verifying each of them; only the "
+          "first can be a loop.")
       .def("skip", &SharedDetector::skip, py::arg("timestamp_s") = py::none(),
            "Counts a frame without a usable image, so that numbers keep step with the camera.")
       .def("__len__", &SharedDetector::size)

@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <vector>
 
 #include "loopbit/loop_detector.hpp"
 
 #include "numpy_image.hpp"
+#include "shared_map.hpp"
 
 namespace loopbit::python {
 
@@ -15,10 +18,14 @@ namespace loopbit::python {
 /// meanwhile.
 class SharedDetector {
  public:
-  explicit SharedDetector(const LoopDetectorOptions& options) : detector_(options) {}
+  /// Without options, those of the map, or the defaults. Throws Error (kind option) if the map was
+  /// made with others of binary_content or surf. To be called without the GIL.
+  SharedDetector(const std::optional<LoopDetectorOptions>& options,
+                 const std::shared_ptr<SharedMap>& map);
 
   Detection process(ImageArgument image, std::optional<double> timestamp_s, Evidence* evidence);
-  [[nodiscard]] Detection query(ImageArgument image, std::optional<double> timestamp_s) const;
+  [[nodiscard]] Detection query(ImageArgument image, std::optional<double> timestamp_s,
+                                std::vector<RankedPlace>* ranking) const;
   Detection skip(std::optional<double> timestamp_s);
   [[nodiscard]] PlaceId size() const;
   [[nodiscard]] LoopDetectorOptions options() const;

@@ -10,8 +10,10 @@ namespace loopbit::python {
 void bind_report(pybind11::module_& module) {
   module.def("_write_report", [](const pybind11::args&) {
     throw std::runtime_error(
-        "This loopbit was built without the report page; build it with Node.js and "
-        "LOOPBIT_BUILD_REPORT=ON, or use the command 'loopbit report'.");
+        "This loopbit was built without the report page, for which Node.js 18.18 or later, npm "
+        "and, "
+        "once, a network are needed; install them, then loopbit again, or use the command 'loopbit "
+        "report'.");
   });
 }
 

@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 #include <atomic>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -14,10 +13,9 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "loopbit/error.hpp"
-#include "loopbit/evaluation.hpp"
 #include "loopbit/evidence_file.hpp"
 #include "loopbit/finished_run.hpp"
-#include "loopbit/run_folder.hpp"
+#include "loopbit/recorded_run.hpp"
 #include "loopbit/runner.hpp"
 
 #include "bind_data.hpp"
@@ -34,7 +32,6 @@ namespace py = pybind11;
 using Path = std::filesystem::path;
 using OnDetection = std::function<void(const Detection&)>;
 using OnBadFrame = std::function<void(const std::string&)>;
-using Times = std::vector<std::optional<double>>;
 using Positions = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// What Python is told between two frames: the interpreter's own signals (Ctrl-C raises), then the
@@ -64,78 +61,65 @@ std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector
   return detections;
 }
 
-/// A run that leaves its evidence in a folder, as loopbit run does. Python calls detect(), what is
-/// to be kept with it, and finish(), whatever happened before.
-class RecordedRun {
- public:
-  RecordedRun(SharedSource& source, const Path& out, const LoopDetectorOptions& options,
-              bool overwrite, bool keep_evidence)
-      : source_(source),
-        detector_(options),
-        folder_(out.string(), overwrite),
-        record_{.input = source.input(),
-                .description = source.description(),
-                .options = options,
-                .every = source.every(),
-                .limit = source.limit()} {
-    if (keep_evidence) evidence_ = std::make_unique<EvidenceWriter>(folder_.evidence_path());
+RunRecord record_of(const SharedSource& source, const LoopDetectorOptions& options,
+                    const std::string& map) {
+  return {.input = source.input(),
+          .description = source.description(),
+          .options = options,
+          .every = source.every(),
+          .limit = source.limit(),
+          .map_path = map};
+}
+
+void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_bad_frame,
+            bool keep_evidence) {
+  const RunListener listener{
+      .on_detection = [](const Detection& detection) { tell(OnDetection{}, detection); },
+      .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, sentence); }};
+  const std::atomic<bool> never{false};
+  const py::gil_scoped_release release;
+  recorded.detect(source, listener, keep_evidence, never);
+}
+
+void keep_positions(RecordedRun& recorded, const Positions& positions_m) {
+  if (positions_m.ndim() != 2 || positions_m.shape(1) != 3) {
+    throw py::value_error(fmt::format("positions_m has shape {}, but must be (n, 3).",
+                                      literal(positions_m.attr("shape"))));
   }
-
-  void detect(const OnBadFrame& on_bad_frame) {
-    RunListener listener{
-        .on_detection =
-            [&](const Detection& detection) {
-              folder_.add(detection);
-              tell(OnDetection{}, detection);
-            },
-        .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, sentence); }};
-    if (evidence_) {
-      listener.on_evidence = [&](const Detection& detection, const cv::Mat& image,
-                                 const Evidence& seen) {
-        evidence_->add(detection.frame, image, seen);
-      };
-    }
-    const std::atomic<bool> never{false};
-    const py::gil_scoped_release release;
-    const auto start = std::chrono::steady_clock::now();
-    run(source_, detector_, listener, never);
-    if (evidence_) evidence_->finish();
-    const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
-    record_.wall_s = elapsed.count();
+  std::vector<std::optional<cv::Vec3d>> rows(static_cast<std::size_t>(positions_m.shape(0)));
+  for (py::ssize_t row = 0; row < positions_m.shape(0); ++row) {
+    const cv::Vec3d position(positions_m.data(row, 0));
+    if (!std::isnan(cv::norm(position))) rows[static_cast<std::size_t>(row)] = position;
   }
+  recorded.keep_positions(rows);
+}
 
-  [[nodiscard]] Times times_s() const { return match_list(folder_.detections()).times_s; }
-
-  void score(const GroundTruth& truth, int tolerance_frames, const std::string& protocol) {
-    folder_.write_truth(truth);
-    record_.score = evaluate(match_list(folder_.detections()), truth, {tolerance_frames, protocol});
-  }
-
-  void keep_positions(const Positions& positions_m) {
-    if (positions_m.ndim() != 2 || positions_m.shape(1) != 3) {
-      throw py::value_error(fmt::format("positions_m has shape {}, but must be (n, 3).",
-                                        literal(positions_m.attr("shape"))));
-    }
-    std::vector<std::optional<cv::Vec3d>> rows(static_cast<std::size_t>(positions_m.shape(0)));
-    for (py::ssize_t row = 0; row < positions_m.shape(0); ++row) {
-      const cv::Vec3d position(positions_m.data(row, 0));
-      if (!std::isnan(cv::norm(position))) rows[static_cast<std::size_t>(row)] = position;
-    }
-    folder_.write_positions(rows);
-  }
-
-  void finish(const std::string& stopped_by) {
-    record_.stopped_by = stopped_by;
-    folder_.finish(record_);
-  }
-
- private:
-  SharedSource& source_;
-  LoopDetector detector_;
-  RunFolder folder_;
-  std::unique_ptr<EvidenceWriter> evidence_;
-  RunRecord record_;
-};
+/// For the package's run_folder(), as loopbit run uses RecordedRun.
+void bind_recorded_run(py::module_& module) {
+  py::class_<RecordedRun>(module, "_RecordedRun")
+      .def(py::init([](const SharedSource& source, const Path& out,
+                       const LoopDetectorOptions& options, const Path& map, bool overwrite,
+                       bool keep_images) {
+             return std::make_unique<RecordedRun>(record_of(source, options, map.string()),
+                                                  RunOutput{out.string(), overwrite, keep_images});
+           }),
+           py::arg("source"), py::arg("out"), py::arg("options"), py::arg("map"),
+           py::arg("overwrite"), py::arg("keep_images"), py::call_guard<py::gil_scoped_release>())
+      .def("detect", &detect, py::arg("source"), py::arg("on_bad_frame"), py::arg("evidence"))
+      .def_property_readonly("path", [](const RecordedRun& self) { return self.folder().path(); })
+      .def_property_readonly(
+          "times_s",
+          [](const RecordedRun& self) { return match_list(self.folder().detections()).times_s; })
+      .def(
+          "score",
+          [](RecordedRun& self, const GroundTruth& truth, int tolerance_frames,
+             const std::string& protocol) {
+            self.score(truth, {tolerance_frames, protocol});
+          },
+          py::arg("truth"), py::arg("tolerance_frames"), py::arg("protocol"))
+      .def("keep_positions", &keep_positions, py::arg("positions_m"))
+      .def("finish", &RecordedRun::finish, py::arg("stopped_by"));
+}
 
 std::map<PlaceId, BinaryContent> contents_of(const FinishedRun& run) {
   std::map<PlaceId, BinaryContent> contents;
@@ -176,16 +160,7 @@ void bind_run(py::module_& module) {
              "What detections say, as any detector's list would.");
   module.def("_run", &run_source, py::arg("source"), py::arg("detector"), py::arg("on_detection"),
              py::arg("on_bad_frame"));
-  py::class_<RecordedRun>(module, "_RecordedRun")
-      .def(py::init<SharedSource&, const Path&, const LoopDetectorOptions&, bool, bool>(),
-           py::arg("source"), py::arg("out"), py::arg("options"), py::arg("overwrite"),
-           py::arg("evidence"), py::keep_alive<1, 2>())
-      .def("detect", &RecordedRun::detect, py::arg("on_bad_frame"))
-      .def_property_readonly("times_s", &RecordedRun::times_s)
-      .def("score", &RecordedRun::score, py::arg("truth"), py::arg("tolerance_frames"),
-           py::arg("protocol"))
-      .def("keep_positions", &RecordedRun::keep_positions, py::arg("positions_m"))
-      .def("finish", &RecordedRun::finish, py::arg("stopped_by"));
+  bind_recorded_run(module);
 }
 
 }  // namespace loopbit::python

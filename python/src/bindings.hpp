@@ -13,6 +13,8 @@ void bind_options(pybind11::module_& module);
 void bind_content(pybind11::module_& module);
 void bind_features(pybind11::module_& module);
 void bind_place_index(pybind11::module_& module);
+void bind_map(pybind11::module_& module);
+void bind_map_tools(pybind11::module_& module);
 void bind_detector(pybind11::module_& module);
 void bind_data(pybind11::module_& module);
 void bind_evaluation(pybind11::module_& module);

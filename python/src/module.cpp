@@ -26,6 +26,8 @@ PYBIND11_MODULE(_loopbit, module) {
   python::bind_content(module);
   python::bind_features(module);
   python::bind_place_index(module);
+  python::bind_map(module);
+  python::bind_map_tools(module);
   python::bind_detector(module);
   python::bind_data(module);
   python::bind_evaluation(module);

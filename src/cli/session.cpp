@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
-#include <filesystem>
 #include <thread>
 #include <utility>
 
@@ -13,13 +11,8 @@
 #include <opencv2/core/utility.hpp>
 
 #include "loopbit/error.hpp"
-#include "loopbit/evaluation.hpp"
-#include "loopbit/evidence_file.hpp"
 #include "loopbit/finished_run.hpp"
-#include "loopbit/map_file.hpp"
-#include "loopbit/picture_jpeg.hpp"
-#include "loopbit/run_folder.hpp"
-#include "loopbit/runner.hpp"
+#include "loopbit/recorded_run.hpp"
 
 #include "commands.hpp"
 #include "progress.hpp"
@@ -47,42 +40,21 @@ void check_readable(const std::vector<Detection>& detections, const std::string&
   }
 }
 
-void drive(ImageSource& source, LoopDetector& detector, RunFolder& folder, bool keep_evidence,
+void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
            const std::atomic<bool>& stop) {
   Progress progress(source.size());
-  RunListener listener{[&](const Detection& detection) {
-                         folder.add(detection);
-                         progress.advance(detection.status == Status::loop);
-                       },
-                       [&](const std::string& sentence) { progress.report(sentence); }};
-  std::optional<EvidenceWriter> evidence;
-  if (keep_evidence) {
-    evidence.emplace(folder.evidence_path());
-    listener.on_evidence = [&](const Detection& detection, const cv::Mat& image,
-                               const Evidence& seen) {
-      evidence->add(detection.frame, image, seen);
-    };
-  }
-  run(source, detector, listener, stop);
-  if (evidence) evidence->finish();
+  const RunListener listener{
+      [&](const Detection& detection) { progress.advance(detection.status == Status::loop); },
+      [&](const std::string& sentence) { progress.report(sentence); }};
+  recorded.detect(source, listener, keep_evidence, stop);
 }
 
-/// Where a run is kept whose user named a map only: "town.db" and session 2 give "town_session_2".
-std::string folder_beside(const std::string& map, int session) {
-  const auto stem = std::filesystem::path(map).replace_extension().string();
-  return fmt::format("{}_session_{}", stem, session);
-}
-
-/// Scores the run in `folder` into `record`, and keeps what it was scored by.
-void score(const Session& session, RunFolder& folder, RunRecord& record) {
-  const MatchList list = match_list(folder.detections());
-  if (const auto positions = session.positions(list.times_s); !positions.empty()) {
-    folder.write_positions(positions);
+void score(const Session& session, RecordedRun& recorded) {
+  const FrameTimes times_s = match_list(recorded.folder().detections()).times_s;
+  if (const auto positions = session.positions(times_s); !positions.empty()) {
+    recorded.keep_positions(positions);
   }
-  const auto truth = session.truth(list.times_s);
-  if (!truth) return;
-  folder.write_truth(*truth);
-  record.score = evaluate(list, *truth, session.evaluation);
+  if (const auto truth = session.truth(times_s)) recorded.score(*truth, session.evaluation);
 }
 
 }  // namespace
@@ -133,54 +105,34 @@ LoopDetectorOptions SessionFlags::detector_options() const {
 }
 
 int run_session(Session session, const SessionFlags& flags) {
-  using Clock = std::chrono::steady_clock;
   const std::atomic<bool>& stop_requested = stop_on_signal();
-  RunRecord record{.input = session.input,
-                   .description = session.source->description(),
-                   .options = flags.detector_options(),
-                   .every = session.every,
-                   .limit = session.limit,
-                   .threads = thread_count(flags.threads)};
-  // Before the folder: what refuses the run may not cost an earlier one.
-  std::shared_ptr<MapWriter> map;
-  if (!flags.map.empty()) {
-    map = std::make_shared<MapWriter>(flags.map, record.options, session.input,
-                                      flags.keep_images ? picture_jpeg : EncodeImage{});
-    record.map_path = flags.map;
-    record.map_session = map->session();
-  }
-  LoopDetector detector(record.options, map);
-  RunFolder folder(flags.out.empty() ? folder_beside(flags.map, record.map_session) : flags.out,
-                   flags.overwrite);
-  cv::setNumThreads(record.threads);
-  if (record.threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
-
-  const auto start = Clock::now();
-  const auto finish = [&](const std::string& stopped_by) {
-    record.stopped_by = stopped_by;
-    folder.finish(record);
-  };
-  const auto elapsed_s = [&] {
-    return std::chrono::duration<double>(Clock::now() - start).count();
-  };
+  const int threads = thread_count(flags.threads);
+  RecordedRun recorded({.input = session.input,
+                        .description = session.source->description(),
+                        .options = flags.detector_options(),
+                        .every = session.every,
+                        .limit = session.limit,
+                        .threads = threads,
+                        .map_path = flags.map},
+                       {flags.out, flags.overwrite, flags.keep_images});
+  cv::setNumThreads(threads);
+  if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
   try {
-    drive(*session.source, detector, folder, !flags.no_report, stop_requested);
-    if (map) map->finish();
-    record.wall_s = elapsed_s();
-    if (!stop_requested) check_readable(folder.detections(), session.input);
-    score(session, folder, record);
+    drive(*session.source, recorded, !flags.no_report, stop_requested);
+    if (!stop_requested) check_readable(recorded.folder().detections(), session.input);
+    score(session, recorded);
   } catch (const Error& error) {
-    record.wall_s = elapsed_s();
     try {
-      finish(error.what());
+      recorded.finish(error.what());
     } catch (const Error&) {  // the disk that failed the run fails its record, too
     }
     throw;
   }
-  finish(stop_requested ? "interrupt" : "end");
+  recorded.finish(stop_requested ? "interrupt" : "end");
+  const RunFolder& folder = recorded.folder();
   if (!flags.no_report)
     write_report(folder.report_path(), {report_run(folder.path())}, flags.report);
-  print_summary(record, folder, !flags.no_report);
+  print_summary(recorded.record(), folder, !flags.no_report);
   return stop_requested ? interrupted : success;
 }
 

@@ -136,15 +136,17 @@ class MapWriter::Impl {
  public:
   Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
        EncodeImage encode_image)
-      : lock_(path),
+      : lock_(std::in_place, path),
         keeps_images_(encode_image != nullptr),
         writer_(begin_session(path, options, name, std::move(encode_image))) {}
 
   void finish() {
+    if (!lock_) return;
     writer_->flush();
     stored_.reset();
     database_.reset();
     writer_->close_log();
+    lock_.reset();
   }
 
   void for_each_earlier_place(const Visit& visit) {
@@ -221,7 +223,7 @@ class MapWriter::Impl {
 
   [[nodiscard]] PlaceId session_begin() { return stored().size() - frames_; }
 
-  WriterLock lock_;
+  std::optional<WriterLock> lock_;  ///< gone after finish(): others may write
   bool keeps_images_;
   int session_ = 0;
   std::int64_t first_place_ = 0;

@@ -75,11 +75,13 @@ def decisions(folder):
 
 def as_row(detection):
     """A detection as loops.csv has it, without the times."""
+    earlier = detection.earlier_match
+    match = f"{earlier.session}:{earlier.frame}" if earlier else detection.match
     return {
         "frame": str(detection.frame),
         "timestamp": "" if detection.timestamp_s is None else f"{detection.timestamp_s:.6f}",
         "status": detection.status.name,
-        "match": "" if detection.match is None else str(detection.match),
+        "match": "" if match is None else str(match),
         "score": repr(detection.score).removesuffix(".0"),
         "similarity": f"{detection.similarity:.6f}",
         "matches": str(detection.matches),

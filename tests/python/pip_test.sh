@@ -31,5 +31,6 @@ assert loopbit.__version__ == importlib.metadata.version("loopbit") == sys.argv[
 assert "venv" in pathlib.Path(loopbit.__file__).parts, loopbit.__file__
 assert {"py.typed", "_loopbit.pyi"} <= {f.name for f in importlib.resources.files(loopbit).iterdir()}
 world = loopbit.World(loopbit.WorldOptions(frames=60, spacing_m=4.0, width_px=160, height_px=120))
-print(loopbit.run(world.source())[-1])
+run = loopbit.run_folder(world.source(), "run")
+assert "<title>" in pathlib.Path(loopbit.write_report(run)).read_text()
 END

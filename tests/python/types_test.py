@@ -31,9 +31,14 @@ detection = detector.process(image, timestamp_s=0.5)
 place: int | None = detection.match
 names: list[str] = [frame.name for frame in loopbit.open_source("images", every=2)]
 score: float = loopbit.evaluate("run", protocol="kitti").average_precision
+ranking: list[loopbit.RankedPlace] = []
+with loopbit.MapWriter("town.db", options, "drive") as map:
+    loopbit.LoopDetector(map=map).query(image, ranking=ranking)
+session: int = ranking[0].place.session
 """
 WRONG = ["detector.process(image, evidence=3)", "loopbit.SurfOptions(max_keypoints='many')",
-         "detection.colour", "loopbit.evaluate('run').average", "loopbit.run(3)"]
+         "detection.colour", "loopbit.evaluate('run').average", "loopbit.run(3)",
+         "loopbit.LoopDetector(map='town.db')"]
 
 
 def python(*arguments):

@@ -156,9 +156,9 @@ class MapWriter : public MapStorage {
   /// Commits what was added so far. Throws Error (kind output).
   void flush();
 
-  /// Commits the rest and closes the file, which then is one file without a log beside it. Throws
-  /// Error (kind output). A detector of this map is of no use afterwards: what it asks for throws
-  /// Error (kind option).
+  /// Commits the rest and closes the file, which then is one file without a log beside it, and may
+  /// be written by others. Throws Error (kind output). A detector of this map is of no use
+  /// afterwards: what it asks for throws Error (kind option).
   void finish();
 
   /// Throws Error (kind input) where a place is damaged: a damaged map is not written to.

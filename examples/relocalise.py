@@ -1,0 +1,22 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""Tells which places of a map the images of a sequence show: relocalise.py MAP INPUT"""
+import sys
+
+import loopbit
+
+map = loopbit.MapReader(sys.argv[1])
+detector = loopbit.LoopDetector(map=map)
+ranking = []
+for frame in loopbit.open_source(sys.argv[2]):
+    if frame.image is None:
+        continue
+    found = detector.query(frame.image, ranking=ranking)
+    if found.is_loop:
+        place = ranking[0].place
+        print(f"{frame.name} is frame {place.frame} of session {place.session}, "
+              f"score {ranking[0].score:g}")
+    else:
+        print(f"{frame.name} is not recognised: {found.status.name}")
+for clause in map.damage:
+    print(f"left out: {clause}", file=sys.stderr)

@@ -1,0 +1,242 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <pybind11/numpy.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "bindings.hpp"
+#include "numpy_image.hpp"
+#include "settings.hpp"
+#include "shared_map.hpp"
+
+namespace loopbit::python {
+namespace {
+
+namespace py = pybind11;
+
+using Free = py::call_guard<py::gil_scoped_release>;
+
+/// A row of places().
+struct PlaceRow {
+  std::int64_t id;
+  int session;
+  int frame;
+  double timestamp_s;
+  std::array<std::uint64_t, kContentSide> content;
+};
+
+/// A row of loops().
+struct LoopRow {
+  int query_session;
+  int query_frame;
+  int match_session;
+  int match_frame;
+  double score;
+  double similarity;
+  int matches;
+  int inliers;
+};
+
+std::vector<PlaceRow> places_of(MapReader& map) {
+  std::vector<PlaceRow> rows;
+  map.for_each_place([&](const MapPlace& place) {
+    rows.push_back({place.id, place.at.session, place.at.frame,
+                    place.timestamp_s.value_or(std::nan("")), place.content.rows});
+  });
+  return rows;
+}
+
+std::vector<LoopRow> loops_of(MapReader& map) {
+  const std::vector<MapLoop> loops = map.loops();
+  std::vector<LoopRow> rows;
+  rows.reserve(loops.size());
+  for (const MapLoop& loop : loops) {
+    rows.push_back({loop.query.session, loop.query.frame, loop.match.session, loop.match.frame,
+                    loop.score, loop.similarity, loop.matches, loop.inliers});
+  }
+  return rows;
+}
+
+/// What a method of a map without parameters returns.
+template <auto method, typename Map>
+auto call(Map& map) {
+  return map.exclusively([](auto& free) { return (free.*method)(); });
+}
+
+/// What `rows_of` collects, as an array; the GIL is free meanwhile.
+template <typename Row>
+py::array array_of(SharedReader& map, std::vector<Row> (*rows_of)(MapReader&)) {
+  std::vector<Row> rows;
+  {
+    const py::gil_scoped_release release;
+    rows = map.exclusively(rows_of);
+  }
+  return take(std::move(rows));
+}
+
+/// Throws TypeError unless `row` is one of places().
+MapPlace place_of(const py::object& row) {
+  try {
+    const auto number = [&](const char* name) { return row[name].cast<std::int64_t>(); };
+    return {.id = number("id"),
+            .at = {static_cast<int>(number("session")), static_cast<int>(number("frame"))}};
+  } catch (const std::exception&) {  // it cannot be asked, has no such field, or no number there
+    throw py::type_error(fmt::format("place is {}, but must be a row of places().", literal(row)));
+  }
+}
+
+std::optional<Features> features_of(SharedReader& map, const py::object& row) {
+  const MapPlace place = place_of(row);
+  const py::gil_scoped_release release;
+  return map.exclusively([&](MapReader& reader) { return reader.features_of(place); });
+}
+
+std::optional<py::bytes> image_of(SharedReader& map, const py::object& row) {
+  const MapPlace place = place_of(row);
+  std::optional<std::vector<unsigned char>> jpeg;
+  {
+    const py::gil_scoped_release release;
+    jpeg = map.exclusively([&](MapReader& reader) { return reader.image_of(place); });
+  }
+  if (!jpeg) return std::nullopt;
+  return py::bytes(reinterpret_cast<const char*>(jpeg->data()), jpeg->size());
+}
+
+void bind_session_frame(py::module_& module) {
+  py::class_<SessionFrame>(module, "SessionFrame", "A frame of one of a map's sessions.")
+      .def(py::init([](int session, int frame) {
+             return SessionFrame{session, frame};
+           }),
+           py::arg("session"), py::arg("frame"))
+      .def_readonly("session", &SessionFrame::session,
+                    "From 1, in the order in which the map met them.")
+      .def_readonly("frame", &SessionFrame::frame, "In its session, from 0.")
+      .def(
+          "__eq__", [](const SessionFrame& a, const SessionFrame& b) { return a == b; },
+          py::is_operator())
+      .def("__hash__",
+           [](const SessionFrame& self) {
+             return py::hash(py::make_tuple(self.session, self.frame));
+           })
+      .def("__repr__", [](const SessionFrame& self) {
+        return fmt::format("SessionFrame(session={}, frame={})", self.session, self.frame);
+      });
+}
+
+void bind_session(py::module_& module) {
+  py::class_<MapSession>(module, "MapSession", "One continuous recording in a map.")
+      .def_readonly("session", &MapSession::session, "From 1; never given twice in a map.")
+      .def_readonly("uid", &MapSession::uid,
+                    "32 hexadecimal digits, the same in every copy of the session.")
+      .def_readonly("name", &MapSession::name, "What was read, as the user named it.")
+      .def_readonly("started", &MapSession::started, "UTC, '2026-11-21T15:04:05Z'.")
+      .def_readonly("loopbit", &MapSession::loopbit, "The version that wrote it.")
+      .def_readonly("options", &MapSession::options, "Of its detector, as to_json() gives them.")
+      .def_readonly("frames", &MapSession::frames, "With the unreadable ones, which are no places.")
+      .def("__repr__", [](const MapSession& self) {
+        return fmt::format("MapSession({}, {}, started {}, {} frames)", self.session,
+                           literal(py::cast(self.name)), self.started, self.frames);
+      });
+}
+
+void bind_reader(py::module_& module) {
+  py::class_<SharedReader, SharedMap, std::shared_ptr<SharedReader>>(
+      module, "MapReader",
+      "A map on disk, to be read, also while it is being written: a reader sees what was committed "
+      "when it looked. What is damaged is left out, never guessed.")
+      .def(py::init<const std::filesystem::path&>(), py::arg("path"), Free(),
+           "Raises InputError if there is no map, or one that cannot be read.")
+      .def_property_readonly("sessions",
+                             py::cpp_function(&call<&MapReader::sessions, SharedReader>, Free()),
+                             "Those that were there when it was opened, in order.")
+      .def_property_readonly(
+          "options", py::cpp_function(&call<&MapReader::options, SharedReader>, Free()),
+          "The defaults, with the settings that the map's places were made with; InputError if no "
+          "session says.")
+      .def(
+          "places", [](SharedReader& self) { return array_of(self, places_of); },
+          "All places that are whole, in order of id: structured array of id, session, frame, "
+          "timestamp_s (nan where there is none) and content (64 words, for BinaryContent()). Half "
+          "a kilobyte a place; features are not touched.")
+      .def(
+          "loops", [](SharedReader& self) { return array_of(self, loops_of); },
+          "All loops that are whole, in the order in which they were found: structured array of "
+          "query_session, query_frame, match_session, match_frame, score, similarity, matches and "
+          "inliers.")
+      .def("features_of", &features_of, py::arg("place"),
+           "The features of a place, a row of places(); None if they are lost.")
+      .def(
+          "image_of", &image_of, py::arg("place"),
+          "The bytes of a small JPEG file of a place, a row of places(); None if none was kept, or "
+          "if it is lost.")
+      .def_property_readonly("damage",
+                             py::cpp_function(&call<&MapReader::damage, SharedReader>, Free()),
+                             "One clause for each thing found damaged so far.")
+      .def("check_structure", &call<&MapReader::check_structure, SharedReader>, Free(),
+           "What SQLite's integrity_check says of the file; empty if all is well.")
+      .def("__repr__", [](const SharedReader& self) {
+        return fmt::format("MapReader({})", literal(py::cast(self.path())));
+      });
+}
+
+void bind_writer(py::module_& module) {
+  py::class_<SharedWriter, SharedMap, std::shared_ptr<SharedWriter>>(
+      module, "MapWriter",
+      "A map on disk that a LoopDetector continues with a session of its own. A map has one "
+      "writer. Frames are committed in batches of 32 or, at the latest, after a second. In a with "
+      "statement, finish() is called at its end.")
+      .def(
+          py::init<const std::filesystem::path&, const LoopDetectorOptions&, const std::string&,
+                   bool>(),
+          py::arg("path"), py::arg("options"), py::arg("name"), py::arg("keep_images") = false,
+          Free(),
+          "Creates or continues a map; the name says what the session reads. Raises OutputError if "
+          "it has a writer or cannot be written, OptionError if it was made with other settings of "
+          "binary_content or surf. keep_images: a small JPEG of each place, too. A session without "
+          "frames leaves no trace.")
+      .def_property_readonly("session",
+                             py::cpp_function(&call<&MapWriter::session, SharedWriter>, Free()),
+                             "The number of the session that is written.")
+      .def_property_readonly(
+          "saved_frames", py::cpp_function(&call<&MapWriter::saved_frames, SharedWriter>, Free()),
+          "Frames of this session that are committed: nothing takes them away again.")
+      .def("flush", &call<&MapWriter::flush, SharedWriter>, Free(),
+           "Commits what was added so far.")
+      .def(
+          "finish", &call<&MapWriter::finish, SharedWriter>, Free(),
+          "Commits the rest and closes the file. A detector of this map is of no use afterwards. A "
+          "writer that nobody holds any more does the same, and keeps its error to itself.")
+      .def("__enter__", [](const std::shared_ptr<SharedWriter>& self) { return self; })
+      .def(
+          "__exit__",
+          [](SharedWriter& self, const py::object& /*type*/, const py::object& /*error*/,
+             const py::object& /*traceback*/) { call<&MapWriter::finish>(self); },
+          py::arg("type"), py::arg("error"), py::arg("traceback"), Free())
+      .def("__repr__", [](const SharedWriter& self) {
+        return fmt::format("MapWriter({})", literal(py::cast(self.path())));
+      });
+}
+
+}  // namespace
+
+void bind_map(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(PlaceRow, id, session, frame, timestamp_s, content);
+  PYBIND11_NUMPY_DTYPE(LoopRow, query_session, query_frame, match_session, match_frame, score,
+                       similarity, matches, inliers);
+  bind_session_frame(module);
+  bind_session(module);
+  py::class_<SharedMap, std::shared_ptr<SharedMap>>(
+      module, "MapStorage", "What a LoopDetector needs of a map: a MapReader or a MapWriter.")
+      .def_property_readonly("path", &SharedMap::path);
+  bind_reader(module);
+  bind_writer(module);
+}
+
+}  // namespace loopbit::python

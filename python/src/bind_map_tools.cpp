@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/map_tools.hpp"
+
+#include "bindings.hpp"
+#include "shared_map.hpp"
+
+namespace loopbit::python {
+namespace {
+
+namespace py = pybind11;
+
+using Path = std::filesystem::path;
+using Free = py::call_guard<py::gil_scoped_release>;
+
+void bind_results(py::module_& module) {
+  py::class_<MapCheck>(module, "MapCheck", "What there is in a map, and what of it is damaged.")
+      .def_readonly("sessions", &MapCheck::sessions)
+      .def_readonly("places", &MapCheck::places, "Whole, with their features.")
+      .def_readonly("loops", &MapCheck::loops)
+      .def_readonly("images", &MapCheck::images, "Whole.")
+      .def_readonly("damage", &MapCheck::damage, "A clause a thing; empty if all is well.")
+      .def("__repr__", [](const MapCheck& self) {
+        return fmt::format("MapCheck(sessions={}, places={}, loops={}, images={}, damage={})",
+                           self.sessions, self.places, self.loops, self.images, self.damage.size());
+      });
+  py::class_<MergeCounts>(module, "MergeCounts", "What merging copied.")
+      .def_readonly("sessions", &MergeCounts::sessions)
+      .def_readonly("places", &MergeCounts::places)
+      .def_readonly("loops", &MergeCounts::loops)
+      .def_readonly("known", &MergeCounts::known,
+                    "Sessions that were there before, told by their uid.")
+      .def("__repr__", [](const MergeCounts& self) {
+        return fmt::format("MergeCounts(sessions={}, places={}, loops={}, known={})", self.sessions,
+                           self.places, self.loops, self.known);
+      });
+  py::class_<CompactCounts>(module, "CompactCounts", "What compacting kept.")
+      .def_readonly("places_before", &CompactCounts::places_before)
+      .def_readonly("places_after", &CompactCounts::places_after)
+      .def_readonly("bytes_before", &CompactCounts::bytes_before)
+      .def_readonly("bytes_after", &CompactCounts::bytes_after)
+      .def("__repr__", [](const CompactCounts& self) {
+        return fmt::format(
+            "CompactCounts(places_before={}, places_after={}, bytes_before={}, bytes_after={})",
+            self.places_before, self.places_after, self.bytes_before, self.bytes_after);
+      });
+}
+
+}  // namespace
+
+void bind_map_tools(py::module_& module) {
+  bind_results(module);
+  module.def(
+      "check_map", [](const Path& path) { return check_map(path.string()); }, py::arg("path"),
+      Free(), "Reads every byte of a map. Raises InputError as MapReader does.");
+  module.def(
+      "recover_map",
+      [](const Path& path, const Path& to) { return recover_map(path.string(), to.string()); },
+      py::arg("path"), py::arg("to"), Free(),
+      "Copies what is whole of a damaged map to a new one, under the same numbers.");
+  module.def(
+      "merge_map",
+      [](const Path& into, const Path& other) { return merge_map(into.string(), other.string()); },
+      py::arg("into"), py::arg("other"), Free(),
+      "Adds to a map, made if there is none, the sessions of another that it lacks, with their "
+      "places and loops; all of them or nothing.");
+  module.def(
+      "compact_map",
+      [](const Path& path, std::vector<int> drop_sessions, std::int64_t max_places,
+         bool drop_images) {
+        if (max_places < 0) {
+          throw Error(
+              ErrorKind::option,
+              fmt::format("max_places is {}, but must be 0 (no limit) or more.", max_places));
+        }
+        return compact_map(path.string(), {std::move(drop_sessions), max_places, drop_images});
+      },
+      py::arg("path"), py::kw_only(), py::arg("drop_sessions") = CompactOptions{}.drop_sessions,
+      py::arg("max_places") = CompactOptions{}.max_places,
+      py::arg("drop_images") = CompactOptions{}.drop_images, Free(),
+      "Forgets sessions with their places and loops, then the places least missed beyond "
+      "max_places (0: none), and the images, and gives their space back. The new file replaces the "
+      "old one in one step.");
+  py::enum_<ExportFormat>(module, "ExportFormat", "How loops are written; see export_loops().")
+      .value("csv", ExportFormat::csv, "a row a loop, which evaluate() reads")
+      .value("json", ExportFormat::json, "sessions and loops")
+      .value("g2o", ExportFormat::g2o, "edges of a pose graph, without poses");
+  module.def(
+      "export_loops",
+      [](SharedReader& map, ExportFormat format) {
+        return map.exclusively([&](MapReader& reader) { return export_loops(reader, format); });
+      },
+      py::arg("map"), py::arg("format"), Free(),
+      "The loops of a map as edges of a graph. Frames are numbered through all sessions, in order "
+      "of session.");
+}
+
+}  // namespace loopbit::python

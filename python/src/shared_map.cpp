@@ -1,0 +1,44 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "shared_map.hpp"
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+namespace loopbit::python {
+
+void SharedMap::for_each_earlier_place(const Visit& visit) {
+  const auto guard = lock();
+  if (has_detector_) {
+    throw Error(
+        ErrorKind::option,
+        fmt::format("map is '{}', which has a detector; open it again for another one.", path_));
+  }
+  has_detector_ = true;
+  storage().for_each_earlier_place(visit);
+}
+
+void SharedMap::for_each_earlier_loop(const VisitLoop& visit) {
+  const auto guard = lock();
+  storage().for_each_earlier_loop(visit);
+}
+
+std::shared_ptr<const Features> SharedMap::features(PlaceId place) {
+  const auto guard = lock();
+  return storage().features(place);
+}
+
+void SharedMap::add(const Detection& detection, const BinaryContent& content,
+                    std::shared_ptr<const Features> features, const cv::Mat& image) {
+  const auto guard = lock();
+  storage().add(detection, content, std::move(features), image);
+}
+
+std::optional<LoopDetectorOptions> SharedReader::options() const {
+  const auto guard = lock();
+  if (reader_.sessions().empty()) return std::nullopt;
+  return reader_.options();
+}
+
+}  // namespace loopbit::python

@@ -1,0 +1,90 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "loopbit/map_file.hpp"
+#include "loopbit/picture_jpeg.hpp"
+
+namespace loopbit::python {
+
+/// A map that several Python threads and one detector may hold: one at a time uses it. All but the
+/// constructor and path() must be called without the GIL: see SharedDetector.
+class SharedMap : public MapStorage {
+ public:
+  explicit SharedMap(std::string path) : path_(std::move(path)) {}
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+  /// What a detector of the map must be given; nothing if the map does not say.
+  [[nodiscard]] virtual std::optional<LoopDetectorOptions> options() const = 0;
+
+  /// Throws Error (kind option) from the second call on: a map numbers its places for one detector.
+  void for_each_earlier_place(const Visit& visit) final;
+  void for_each_earlier_loop(const VisitLoop& visit) final;
+  std::shared_ptr<const Features> features(PlaceId place) final;
+  void add(const Detection& detection, const BinaryContent& content,
+           std::shared_ptr<const Features> features, const cv::Mat& image) final;
+
+ protected:
+  [[nodiscard]] std::scoped_lock<std::mutex> lock() const { return std::scoped_lock(mutex_); }
+
+ private:
+  [[nodiscard]] virtual MapStorage& storage() = 0;
+
+  std::string path_;
+  bool has_detector_ = false;
+  mutable std::mutex mutex_;
+};
+
+class SharedReader : public SharedMap {
+ public:
+  explicit SharedReader(const std::filesystem::path& path)
+      : SharedMap(path.string()), reader_(path.string()) {}
+
+  [[nodiscard]] std::optional<LoopDetectorOptions> options() const override;
+
+  /// Calls use(reader) while nobody else may, and returns what it returns.
+  template <typename Use>
+  auto exclusively(Use&& use) {
+    const auto guard = lock();
+    return use(reader_);
+  }
+
+ private:
+  [[nodiscard]] MapStorage& storage() override { return reader_; }
+
+  MapReader reader_;
+};
+
+class SharedWriter : public SharedMap {
+ public:
+  SharedWriter(const std::filesystem::path& path, const LoopDetectorOptions& options,
+               const std::string& name, bool keep_images)
+      : SharedMap(path.string()),
+        options_(options),
+        writer_(path.string(), options, name, keep_images ? picture_jpeg : EncodeImage{}) {}
+
+  [[nodiscard]] std::optional<LoopDetectorOptions> options() const override { return options_; }
+
+  /// As SharedReader's.
+  template <typename Use>
+  auto exclusively(Use&& use) {
+    const auto guard = lock();
+    return use(writer_);
+  }
+
+ private:
+  [[nodiscard]] MapStorage& storage() override { return writer_; }
+
+  LoopDetectorOptions options_;
+  MapWriter writer_;
+};
+
+}  // namespace loopbit::python

@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/recorded_run.hpp"
+
+#include <chrono>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/evidence_file.hpp"
+#include "loopbit/finished_run.hpp"
+#include "loopbit/picture_jpeg.hpp"
+
+namespace loopbit {
+namespace {
+
+/// Sets `seconds` to the time that has passed, when it goes out of scope.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& seconds) : seconds_(seconds) {}
+  ~Stopwatch() {
+    seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+  Stopwatch(Stopwatch&&) = delete;
+  Stopwatch& operator=(Stopwatch&&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// Null if `record` names no map; else record.map_session is set.
+std::shared_ptr<MapWriter> open_map(RunRecord& record, bool keep_images) {
+  if (record.map_path.empty()) return nullptr;
+  auto map = std::make_shared<MapWriter>(record.map_path, record.options, record.input,
+                                         keep_images ? picture_jpeg : EncodeImage{});
+  record.map_session = map->session();
+  return map;
+}
+
+std::string folder_of(const RunRecord& record, const std::string& out) {
+  if (!out.empty()) return out;
+  if (record.map_path.empty()) {
+    throw Error(ErrorKind::option, "Nothing says where to keep the run; name a folder or a map.");
+  }
+  const auto stem = std::filesystem::path(record.map_path).replace_extension().string();
+  return fmt::format("{}_session_{}", stem, record.map_session);
+}
+
+}  // namespace
+
+RecordedRun::RecordedRun(RunRecord record, const RunOutput& out)
+    : record_(std::move(record)),
+      map_(open_map(record_, out.keep_images)),
+      detector_(std::in_place, record_.options, map_),
+      folder_(folder_of(record_, out.folder), out.overwrite) {}
+
+void RecordedRun::detect(ImageSource& source, const RunListener& listener, bool keep_evidence,
+                         const std::atomic<bool>& stop) {
+  const Stopwatch stopwatch(record_.wall_s);
+  // Of this call's own, so that an error closes the map, too.
+  const std::shared_ptr<MapWriter> map = std::move(map_);
+  LoopDetector detector = std::move(*detector_);
+  RunListener recording{.on_detection =
+                            [&](const Detection& detection) {
+                              folder_.add(detection);
+                              listener.on_detection(detection);
+                            },
+                        .on_bad_frame = listener.on_bad_frame};
+  std::optional<EvidenceWriter> evidence;
+  if (keep_evidence) {
+    evidence.emplace(folder_.evidence_path());
+    recording.on_evidence = [&](const Detection& detection, const cv::Mat& image,
+                                const Evidence& seen) {
+      evidence->add(detection.frame, image, seen);
+    };
+  }
+  run(source, detector, recording, stop);
+  if (evidence) evidence->finish();
+  if (map) map->finish();
+}
+
+void RecordedRun::keep_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m) {
+  folder_.write_positions(positions_m);
+}
+
+void RecordedRun::score(const GroundTruth& truth, const EvaluationOptions& options) {
+  folder_.write_truth(truth);
+  record_.score = evaluate(match_list(folder_.detections()), truth, options);
+}
+
+void RecordedRun::finish(const std::string& stopped_by) {
+  record_.stopped_by = stopped_by;
+  folder_.finish(record_);
+}
+
+}  // namespace loopbit

@@ -1,0 +1,117 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/recorded_run.hpp"
+
+#include <atomic>
+#include <filesystem>
+
+#include "loopbit/finished_run.hpp"
+
+#include "map_support.hpp"
+#include "test_support.hpp"
+
+namespace loopbit {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kFrames = 3;
+const std::atomic<bool> kNeverStop{false};
+
+/// Three views, then the end, or an error.
+class ThreeViews final : public ImageSource {
+ public:
+  explicit ThreeViews(bool fails = false) : fails_(fails) {}
+
+  bool next(Frame& frame) override {
+    if (position_ == kFrames && fails_) throw Error(ErrorKind::input, "The cable is out.");
+    if (position_ == kFrames) return false;
+    frame = {};
+    frame.image = test::view(position_++);
+    return true;
+  }
+  bool skip() override { return position_++ < kFrames; }
+  [[nodiscard]] std::optional<std::size_t> size() const override { return kFrames; }
+  [[nodiscard]] std::string description() const override { return "three views"; }
+
+ private:
+  bool fails_;
+  int position_ = 0;
+};
+
+RunListener nobody() {
+  return {[](const Detection&) {}, [](const std::string&) {}};
+}
+
+class RecordedRunTest : public test::ScratchTest {
+ protected:
+  [[nodiscard]] RunRecord record(const std::string& map = "") const {
+    return {.input = "views",
+            .description = "three views",
+            .options = test::fast_options(),
+            .map_path = map.empty() ? "" : path(map)};
+  }
+};
+
+TEST_F(RecordedRunTest, LeavesWhatItDetected) {
+  ThreeViews source;
+  RecordedRun recorded(record(), {path("run")});
+  int told = 0;
+  recorded.detect(source,
+                  {.on_detection =
+                       [&](const Detection& detection) {
+                         EXPECT_EQ(detection.frame, told++);
+                         EXPECT_EQ(read_run(path("run")).detections.size(),
+                                   static_cast<std::size_t>(told));
+                       },
+                   .on_bad_frame = nobody().on_bad_frame},
+                  true, kNeverStop);
+  recorded.keep_positions({cv::Vec3d(1, 2, 3), std::nullopt, std::nullopt});
+  recorded.score({{{2, 0, 0}}, {}, {}}, {});
+  recorded.finish("end");
+  EXPECT_EQ(told, kFrames);
+  EXPECT_GT(recorded.record().wall_s, 0);
+  const FinishedRun run = read_run(path("run"));
+  EXPECT_EQ(run.positions_m[0], cv::Vec3d(1, 2, 3));
+  EXPECT_EQ(run.truth->same_place.size(), 1U);
+  EXPECT_FALSE(run.evidence_path.empty());
+  EXPECT_NE(run.record_json.find("\"stopped_by\": \"end\""), std::string::npos);
+  EXPECT_EQ(recorded.record().score->decision.positives, 1);
+}
+
+TEST_F(RecordedRunTest, ContinuesAMapAndIsKeptBesideIt) {
+  for (int session = 1; session <= 2; ++session) {
+    ThreeViews source;
+    RecordedRun recorded(record("town.db"), {});
+    recorded.detect(source, nobody(), false, kNeverStop);
+    recorded.finish("end");
+    EXPECT_EQ(recorded.folder().path(), path("town_session_" + std::to_string(session)));
+    EXPECT_EQ(recorded.record().map_session, session);
+  }
+  EXPECT_EQ(test::places_of(path("town.db")).size(), 2U * kFrames);
+}
+
+TEST_F(RecordedRunTest, AnErrorClosesTheMapAndKeepsWhatItHas) {
+  ThreeViews source(true);
+  RecordedRun recorded(record("town.db"), {});
+  test::expect_error(ErrorKind::input, {"cable"},
+                     [&] { recorded.detect(source, nobody(), true, kNeverStop); });
+  recorded.finish("The cable is out.");
+  EXPECT_EQ(read_run(recorded.folder().path()).detections.size(), std::size_t{kFrames});
+  const MapWriter next(path("town.db"), test::fast_options(), "next");
+  EXPECT_EQ(test::places_of(path("town.db")).size(), std::size_t{kFrames});
+}
+
+TEST_F(RecordedRunTest, WhatRefusesARunCostsNoEarlierOne) {
+  { const RecordedRun earlier(record("town.db"), {path("run")}); }
+  const MapWriter busy(path("town.db"), test::fast_options(), "busy");
+  test::expect_error(ErrorKind::output, {"being written"}, [&] {
+    const RecordedRun run(record("town.db"), {path("run"), true});
+  });
+  EXPECT_TRUE(fs::exists(path("run/loops.csv")));
+  test::expect_error(ErrorKind::option, {"folder or a map"},
+                     [&] { const RecordedRun run(record(), {}); });
+}
+
+}  // namespace
+}  // namespace loopbit
