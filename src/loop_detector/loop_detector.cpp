@@ -29,6 +29,8 @@ namespace {
 constexpr double kUnmovedSimilarity = 0.8;
 /// Different places share a few inliers by chance; with so many they share a thing.
 constexpr int kMinSightingInliers = 8;
+/// Fewer matches of what a promising candidate has are chance, and hardly change its distinctness.
+constexpr int kMinSharedMatches = 4;
 class Stopwatch {
  public:
   double lap_ms() {
@@ -328,7 +330,7 @@ class LoopDetector::Impl {
     is_promising_.assign(seen.features.keypoints.size(), false);
     for (const auto& [negative_bound, i] : order) {
       const bool may_win = -negative_bound >= best;
-      if (!may_win && num_shared(verifications_[i].matches) < kMinSightingInliers) continue;
+      if (!may_win && num_shared(verifications_[i].matches) < kMinSharedMatches) continue;
       find_geometry(seen, seen.verified[i], verifications_[i]);
       best = std::max(best, agreement_.score(seen.verified[i], seen.look.is_step));
       if (seen.verified[i].evidence() <= options_.decision.chance_evidence) continue;
