@@ -31,6 +31,7 @@ constexpr double kUnmovedSimilarity = 0.8;
 constexpr int kMinSightingInliers = 8;
 /// Fewer matches of what a promising candidate has are chance, and hardly change its distinctness.
 constexpr int kMinSharedMatches = 4;
+
 class Stopwatch {
  public:
   double lap_ms() {
@@ -315,7 +316,7 @@ class LoopDetector::Impl {
   /// first, until none of the others can have a higher score than the best. A candidate with more
   /// evidence than chance gives is promising; then others that may have what it has are verified
   /// all the same, to see how much of it they share. Those left out keep no inliers: they change
-  /// nothing now, and support no later match.
+  /// nothing now, and add nothing to the support of later matches.
   void verify_candidates(const std::vector<Candidate>& candidates, Observation& seen) const {
     verifications_.resize(std::max(verifications_.size(), candidates.size()));
     std::vector<std::pair<double, std::size_t>> order;
