@@ -101,5 +101,10 @@ class Runner:
         return json.loads(done.stdout)
 
 
+def highest_wrong(score):
+    """The score of the wrong match that scored highest: the curve goes from high scores to low."""
+    return next((point["score"] for point in score["curve"] if point["wrong"] > 0), 0.0)
+
+
 def machine(record):
     return f"{record['machine']['processor']}, {record['machine']['kernel']} kernels"
