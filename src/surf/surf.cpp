@@ -66,8 +66,7 @@ class SurfExtractor::Impl {
                         std::max(1, cvRound(gray.rows * factor)));
     if (size == gray.size()) return gray;
     const bool skips_pixels = factor < kLeastLinearFactor;
-    cv::resize(gray, working_, size, 0, 0,
-               skips_pixels ? cv::INTER_AREA : cv::INTER_LINEAR_EXACT);
+    cv::resize(gray, working_, size, 0, 0, skips_pixels ? cv::INTER_AREA : cv::INTER_LINEAR_EXACT);
     return working_;
   }
 
