@@ -107,6 +107,21 @@ TEST(Agreement, StepWithoutTheCandidateEndsItsSupport) {
   EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15);
 }
 
+TEST(Agreement, StepWithoutEvidenceHandsSupportOn) {
+  Agreement agreement(halves());
+  agreement.remember({candidate(99, 48)});
+  agreement.remember({candidate(101, 0), candidate(7, 8)});
+  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15 + 0.5 * 20);
+}
+
+TEST(Agreement, EvidenceForOnePlaceEndsTheWaysToOthers) {
+  Agreement agreement(halves());
+  agreement.remember({candidate(97, 48)});
+  agreement.remember({candidate(95, 28), candidate(99, 8), candidate(101, 0)});
+  EXPECT_DOUBLE_EQ(score_of_next_step(agreement), 15);
+  EXPECT_DOUBLE_EQ(agreement.score(candidate(96, 15), true), 15 + 0.5 * (20 + 20));
+}
+
 TEST(Agreement, WithoutWeightTheScoreIsTheEvidence) {
   Agreement agreement({.agreement_weight = 0});
   agreement.remember({candidate(100, 50)});

@@ -43,12 +43,17 @@ double Agreement::score(const VerifiedCandidate& verified, bool is_step) const {
 }
 
 void Agreement::remember(const std::vector<VerifiedCandidate>& step) {
+  const auto beyond_chance = [&](const VerifiedCandidate& v) {
+    return std::max(0.0, v.evidence() - options_.chance_evidence);
+  };
+  const bool is_known_place = std::any_of(
+      step.begin(), step.end(), [&](const VerifiedCandidate& v) { return beyond_chance(v) > 0; });
   std::vector<Trail> trails;
   trails.reserve(step.size());
   for (const VerifiedCandidate& v : step) {
-    const double beyond_chance = std::max(0.0, v.evidence() - options_.chance_evidence);
+    if (is_known_place && beyond_chance(v) == 0) continue;
     const double before = options_.agreement_memory * support_near(latest_, v.step);
-    trails.push_back({v.step, beyond_chance + before});
+    trails.push_back({v.step, beyond_chance(v) + before});
   }
   before_latest_ = std::exchange(latest_, std::move(trails));
 }

@@ -44,7 +44,9 @@ class Agreement {
   /// other, is compared with decision.min_score.
   [[nodiscard]] double score(const VerifiedCandidate& verified, bool is_step) const;
 
-  /// Notes the candidates of a step.
+  /// Notes the candidates of a step. Where some have evidence beyond chance, they say where the
+  /// step is, and all other ways end; where none has, all go on. Else support would drift along a
+  /// map of few places, of which nearly all are candidates.
   void remember(const std::vector<VerifiedCandidate>& step);
 
  private:
@@ -57,7 +59,7 @@ class Agreement {
   static double support_near(const std::vector<Trail>& trails, std::ptrdiff_t step);
 
   DecisionOptions options_;
-  std::vector<Trail> latest_;         ///< one a candidate of the last step
+  std::vector<Trail> latest_;         ///< one a way that goes on to the last step
   std::vector<Trail> before_latest_;  ///< of the step before
 };
 
