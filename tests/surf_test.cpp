@@ -232,6 +232,7 @@ TEST(Surf, KeypointsAreInPixelsOfTheWorkingImage) {
 TEST(Surf, ImagesOfAllShapesAreScaledToTheSameArea) {
   EXPECT_EQ(extract_surf(textured_image({1242, 375}, 1)).working_size_px, cv::Size(1009, 305));
   EXPECT_EQ(extract_surf(textured_image({375, 1242}, 1)).working_size_px, cv::Size(305, 1009));
+  EXPECT_EQ(extract_surf(textured_image({40000, 32}, 1)).working_size_px, cv::Size(16384, 13));
   EXPECT_EQ(extract_surf(textured_image({160, 120}, 1)).working_size_px, cv::Size(640, 480));
 }
 
