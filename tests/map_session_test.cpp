@@ -53,6 +53,18 @@ TEST_F(MapSession, AMapChangesNothingWithinASession) {
   EXPECT_GT(loops, kLap / 2);
 }
 
+TEST_F(MapSession, AVeryNarrowImageIsAPlaceAsAnyOther) {
+  const LoopDetectorOptions options;
+  const cv::Mat1b narrow = textured_image({5800, 72}, 1);
+  auto map = std::make_shared<MapWriter>(path("map.db"), options, "drive");
+  LoopDetector(options, map).process(narrow);
+  map->finish();
+  map = std::make_shared<MapWriter>(path("map.db"), options, "drive");
+  const Detection again = LoopDetector(options, map).process(narrow);
+  EXPECT_EQ(again.earlier_match, (SessionFrame{1, 0}));
+  EXPECT_GT(again.matches, 50);
+}
+
 TEST_F(MapSession, EarlierSessionsAreRecognisedFromTheFirstFrameOn) {
   drive(0, kLap - 1);
   const auto detections = drive(5, kLap - 1, {6, 2});

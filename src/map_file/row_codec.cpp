@@ -22,13 +22,13 @@ static_assert(std::is_trivially_copyable_v<Keypoint>);
 using Header = std::array<std::int32_t, 4>;
 
 /// See SurfOptions::fields().
-constexpr std::int32_t kMaxSide_px = 4096;
 constexpr std::int32_t kMaxKeypoints = 10000;
 
 bool is_sane(const Header& header) {
   const auto [width, height, num_dark, size] = header;
-  return width >= 0 && width <= kMaxSide_px && height >= 0 && height <= kMaxSide_px && size >= 0 &&
-         size <= kMaxKeypoints && num_dark >= 0 && num_dark <= size;
+  const auto is_side = [](std::int32_t side) { return side >= 0 && side <= kMaxWorkingSide_px; };
+  return is_side(width) && is_side(height) && size >= 0 && size <= kMaxKeypoints && num_dark >= 0 &&
+         num_dark <= size;
 }
 
 bool is_sane(const Keypoint& keypoint) {

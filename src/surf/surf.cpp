@@ -18,8 +18,6 @@ namespace {
 
 /// In squared grey levels: below, the 8 bits of a pixel are too coarse to tell a blob.
 constexpr float kMinResponse = 1.0F;
-/// However narrow an image is, its longer side is scaled to no more than this.
-constexpr double kMaxSide_px = 16384;
 /// Down to this factor, linear interpolation takes every pixel into account; it is five times
 /// faster than averaging areas.
 constexpr double kLeastLinearFactor = 0.5;
@@ -60,8 +58,9 @@ class SurfExtractor::Impl {
  private:
   const cv::Mat1b& working_image(const cv::Mat1b& gray) {
     const double area = static_cast<double>(gray.cols) * gray.rows;
-    const double factor = std::min(std::sqrt(options_.working_area_px / area),
-                                   kMaxSide_px / std::max(gray.cols, gray.rows));
+    const double factor =
+        std::min(std::sqrt(options_.working_area_px / area),
+                 static_cast<double>(kMaxWorkingSide_px) / std::max(gray.cols, gray.rows));
     const cv::Size size(std::max(1, cvRound(gray.cols * factor)),
                         std::max(1, cvRound(gray.rows * factor)));
     if (size == gray.size()) return gray;

@@ -27,6 +27,9 @@ struct Keypoint {
 /// A unit-length SURF descriptor, 64 values, times 127 / 0.5 and rounded; larger ones are cut off.
 using Descriptor = std::array<std::int8_t, 64>;
 
+/// However narrow an image is, its longer side is scaled to no more than this.
+inline constexpr int kMaxWorkingSide_px = 16384;
+
 /// The features of one image; keypoints[i] belongs to descriptors[i]. Dark blobs come first, then
 /// bright ones, each strongest first.
 struct Features {
