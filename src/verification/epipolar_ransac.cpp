@@ -139,6 +139,16 @@ int seven_point(std::array<Row, kSample>& rows, std::array<cv::Matx33d, 3>& mode
   return count;
 }
 
+/// The nearest matrix of rank two: without the part along the right singular vector of the smallest
+/// singular value.
+cv::Matx33d rank_two(const cv::Matx33d& f) {
+  cv::Matx31d values;
+  cv::Matx33d vectors;
+  cv::eigen(f.t() * f, values, vectors);
+  const cv::Matx31d smallest = vectors.row(2).t();
+  return f - f * smallest * smallest.t();
+}
+
 /// Of the square of Sampson's distance: numerator and denominator.
 struct Sampson {
   explicit Sampson(const cv::Matx33d& model) {
@@ -214,23 +224,29 @@ void EpipolarRansac::mark(const cv::Matx33d& model) {
   }
 }
 
-/// The matrix that fits all inliers best, by the eight-point algorithm.
+/// The matrix that fits all inliers best, by the eight-point algorithm. What minimizes the sum of
+/// squares is the eigenvector of the smallest eigenvalue; inverse iteration finds it from the best
+/// model so far in a tenth of the time that all eigenvectors would take.
 cv::Matx33d EpipolarRansac::fit() const {
+  using Vector = cv::Matx<double, 9, 1>;
   cv::Matx<double, 9, 9> squares = cv::Matx<double, 9, 9>::zeros();
   for (std::size_t k = 0; k < pairs_.size(); ++k) {
     if (is_inlier_[k] == 0) continue;
-    const cv::Matx<double, 9, 1> row(constraint(pairs_[k]).data());
+    const Vector row(constraint(pairs_[k]).data());
     squares += row * row.t();
   }
-  cv::Matx<double, 9, 1> values;
-  cv::Matx<double, 9, 9> vectors;
-  cv::eigen(squares, values, vectors);
-  const cv::Matx33d full(vectors.row(8).val);
-  cv::Matx31d w;
-  cv::Matx33d u;
-  cv::Matx33d vt;
-  cv::SVD::compute(full, w, u, vt);
-  return u * cv::Matx33d::diag({w(0), w(1), 0.0}) * vt;
+  // Where the inliers agree exactly there is no inverse without a little on the diagonal.
+  constexpr double kRelativeShift = 1e-12;
+  const double shift = kRelativeShift * cv::trace(squares);
+  for (int i = 0; i < 9; ++i) squares(i, i) += shift;
+  const cv::Matx<double, 9, 9> inverse = squares.inv(cv::DECOMP_CHOLESKY);
+  constexpr int kIterations = 5;
+  Vector f(best_.val);
+  for (int i = 0; i < kIterations; ++i) {
+    f = inverse * f;
+    f *= 1 / cv::norm(f);
+  }
+  return rank_two(cv::Matx33d(f.val));
 }
 
 void EpipolarRansac::refit() {
