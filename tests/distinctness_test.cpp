@@ -30,11 +30,11 @@ class Sightings {
     std::vector<Sighting> all;
     all.reserve(places_.size());
     for (const auto& [step, inliers] : places_) {
-      all.push_back({step, loops.first_visit(step), inliers});
+      all.push_back({{step, loops.first_visit(step)}, inliers});
     }
     const Sighting asked = all[place];
     std::sort(all.begin(), all.end(),
-              [](const auto& a, const auto& b) { return a.first_visit < b.first_visit; });
+              [](const auto& a, const auto& b) { return a.spot.first_visit < b.spot.first_visit; });
     return distinctness(asked, all);
   }
 

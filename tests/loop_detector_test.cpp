@@ -229,6 +229,39 @@ TEST(LoopDetector, LoopIsTheBestNeighbourOfItsCandidate) {
   EXPECT_EQ(detection.match, 2);
 }
 
+TEST(LoopDetector, AFirstLookPutsTheRightCandidateFirst) {
+  LoopDetectorOptions options = short_window_options();
+  options.verification.max_closer_looks = 1;
+  const LoopDetector detector = after_places(0, 40, options);
+  for (int place = 0; place < 40; place += 3) {
+    const Detection detection = detector.query(again(place));
+    EXPECT_EQ(detection.status, Status::loop) << place;
+    EXPECT_EQ(detection.match, place);
+  }
+}
+
+TEST(LoopDetector, AFirstLookFindsAsManyLoopsInRealImages) {
+  LOOPBIT_NEEDS_DATA("corridor_loop");
+  LoopDetectorOptions thorough;
+  thorough.verification.max_closer_looks = 1000;
+  LoopDetector quick_detector;
+  LoopDetector thorough_detector(thorough);
+  int loops = 0;
+  int thorough_loops = 0;
+  for (std::size_t frame = 0; frame < 84; ++frame) {
+    const cv::Mat1b image = real_image("corridor_loop/images", frame);
+    const Detection a = quick_detector.process(image);
+    const Detection b = thorough_detector.process(image);
+    if (a.status == Status::loop && b.status == Status::loop) {
+      EXPECT_NEAR(*a.match, *b.match, 3);
+    }
+    loops += a.status == Status::loop ? 1 : 0;
+    thorough_loops += b.status == Status::loop ? 1 : 0;
+  }
+  EXPECT_GT(loops, 30);
+  EXPECT_GE(loops, thorough_loops - 1);
+}
+
 TEST(LoopDetector, EvidenceCountsLessWhileTheMapIsSmall) {
   const auto score_in_a_map_of = [](int places) {
     LoopDetectorOptions options = short_window_options();

@@ -435,6 +435,51 @@ TEST(Verify, HalvesMakeTheWhole) {
   }
 }
 
+/// The first features of each sign, `num` in all, as many of each as their share is.
+Features strongest(const Features& all, std::size_t num) {
+  const std::size_t dark = all.num_dark * num / all.keypoints.size();
+  const auto part = [&](const auto& of) {
+    auto kept = of;
+    kept.erase(kept.begin() + static_cast<std::ptrdiff_t>(all.num_dark + num - dark), kept.end());
+    kept.erase(kept.begin() + static_cast<std::ptrdiff_t>(dark),
+               kept.begin() + static_cast<std::ptrdiff_t>(all.num_dark));
+    return kept;
+  };
+  return {all.working_size_px, dark, part(all.keypoints), part(all.descriptors)};
+}
+
+TEST(Verify, AFirstLookMatchesTheStrongestFeatures) {
+  constexpr int kLooked = 60;
+  const Features query = extract_surf(view(2));
+  const Features place = extract_surf(view(2, {12, 5}));
+  const Features of_query = strongest(query, kLooked);
+  const Features of_place = strongest(place, kLooked);
+  Verifier verifier({.first_look_keypoints = kLooked});
+  Verification look;
+  verifier.match_strongest(query, place, look);
+  const std::vector<Match> expected = match_features(of_query, of_place, 0.8);
+  ASSERT_GT(expected.size(), 5U);
+  ASSERT_EQ(look.matches.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    const auto at = [](const Features& features, int index) {
+      return features.descriptors[static_cast<std::size_t>(index)];
+    };
+    EXPECT_EQ(at(query, look.matches[i].query), at(of_query, expected[i].query));
+    EXPECT_EQ(at(place, look.matches[i].place), at(of_place, expected[i].place));
+  }
+}
+
+TEST(Verify, AFirstLookAtFewFeaturesIsAWholeOne) {
+  const Features query = extract_surf(view(2), {.max_keypoints = 100});
+  const Features place = extract_surf(view(2, {12, 5}), {.max_keypoints = 90});
+  Verifier verifier;
+  Verification look;
+  verifier.match_strongest(query, place, look);
+  EXPECT_EQ(look.matches, verify(query, place).matches);
+  verifier.match_strongest(query, {}, look);
+  EXPECT_TRUE(look.matches.empty());
+}
+
 TEST(Verify, OtherSceneHasFewInliers) {
   const Features query = extract_surf(view(3));
   for (int scene = 4; scene < 12; ++scene) {

@@ -416,7 +416,9 @@ class Verification:
     def matches(self) -> numpy.typing.NDArray[Any]: ...
 
 class VerificationOptions:
-    def __init__(self, *, max_ratio: float = ..., min_matches: int = ..., max_epipolar_error_px: float = ..., min_spacing_scales: float = ...) -> None: ...
+    def __init__(self, *, first_look_keypoints: int = ..., max_closer_looks: int = ..., max_ratio: float = ..., min_matches: int = ..., max_epipolar_error_px: float = ..., min_spacing_scales: float = ...) -> None: ...
+    first_look_keypoints: int
+    max_closer_looks: int
     max_epipolar_error_px: float
     max_ratio: float
     min_matches: int

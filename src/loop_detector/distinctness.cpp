@@ -11,11 +11,6 @@ namespace {
 
 constexpr std::ptrdiff_t kSamePlaceSteps = 6;
 
-bool is_same_place(const Sighting& a, const Sighting& b) {
-  return std::abs(a.step - b.step) < kSamePlaceSteps ||
-         std::abs(a.first_visit - b.first_visit) < kSamePlaceSteps;
-}
-
 /// In how many other places a feature of the query was found.
 struct Places {
   int count = 0;
@@ -24,15 +19,20 @@ struct Places {
 
 }  // namespace
 
+bool is_same_place(const Spot& a, const Spot& b) {
+  return std::abs(a.step - b.step) < kSamePlaceSteps ||
+         std::abs(a.first_visit - b.first_visit) < kSamePlaceSteps;
+}
+
 double distinctness(const Sighting& sighting, const std::vector<Sighting>& all) {
   if (sighting.inliers.empty()) return 1;
   std::vector<Places> found;
   int place = 0;
   std::ptrdiff_t latest_visit = std::numeric_limits<std::ptrdiff_t>::min() / 2;
   for (const Sighting& other : all) {
-    if (is_same_place(other, sighting)) continue;
-    if (other.first_visit - latest_visit >= kSamePlaceSteps) ++place;
-    latest_visit = other.first_visit;
+    if (is_same_place(other.spot, sighting.spot)) continue;
+    if (other.spot.first_visit - latest_visit >= kSamePlaceSteps) ++place;
+    latest_visit = other.spot.first_visit;
     for (const Match& match : other.inliers) {
       const auto feature = static_cast<std::size_t>(match.query);
       if (feature >= found.size()) found.resize(feature + 1);

@@ -17,7 +17,7 @@
 #include "loopbit/kernels.hpp"
 
 #include "agreement.hpp"
-#include "distinctness.hpp"
+#include "candidate_verifier.hpp"
 #include "known_loops.hpp"
 #include "place_memory.hpp"
 #include "recent_view.hpp"
@@ -27,10 +27,6 @@ namespace {
 
 /// Two frames this alike show the same view: the camera has hardly moved in between.
 constexpr double kUnmovedSimilarity = 0.8;
-/// Different places share a few inliers by chance; with so many they share a thing.
-constexpr int kMinSightingInliers = 8;
-/// Fewer matches of what a promising candidate has are chance, and hardly change its distinctness.
-constexpr int kMinSharedMatches = 4;
 
 class Stopwatch {
  public:
@@ -88,7 +84,11 @@ class LoopDetector::Impl {
         memory_(std::move(map)),
         agreement_(options.decision),
         surf_(options.surf),
-        verifier_(options.verification) {
+        verifier_(options.verification),
+        candidates_(options_,
+                    {[this](PlaceId place) -> const Features& { return features(place); },
+                     [this](PlaceId place) { return step_of(place); }},
+                    agreement_, known_loops_) {
     validate(options);
     PlaceId latest_step = 0;
     memory_.restore([&](const BinaryContent& content) {
@@ -111,7 +111,6 @@ class LoopDetector::Impl {
     RecentView::Look look;
     std::ptrdiff_t earlier_steps = 0;  ///< that may be candidates
     std::vector<VerifiedCandidate> verified;
-    std::vector<Sighting> sightings;        ///< none if no candidate is promising
     std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
   };
 
@@ -142,7 +141,7 @@ class LoopDetector::Impl {
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that geometry and the frames before agree on.
-    verify_candidates(candidates, seen);
+    seen.verified = candidates_.verify(verified_query(seen), candidates);
     decide(seen, end, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
     return detection;
@@ -163,10 +162,7 @@ class LoopDetector::Impl {
 
   /// How each candidate scored, in the order in which decide() ranks them.
   [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen) const {
-    for (std::size_t i = 0; i < seen.verified.size(); ++i) {
-      if (seen.verified[i].inliers > 0) continue;
-      find_geometry(seen, seen.verified[i], verifications_[i]);
-    }
+    candidates_.complete(verified_query(seen), seen.verified);
     if (seen.best) {
       std::erase_if(seen.verified, [&](const VerifiedCandidate& v) {
         return v.candidate.place == seen.best->candidate.place;
@@ -256,95 +252,8 @@ class LoopDetector::Impl {
     return index_.add(content);
   }
 
-  /// The first half of the verification of a candidate: its matches.
-  [[nodiscard]] VerifiedCandidate matched(const Features& query, const Candidate& candidate,
-                                          Verification& result) const {
-    verifier_.match(query, features(candidate.place), result);
-    return {candidate, step_of(candidate.place), static_cast<int>(result.matches.size())};
-  }
-
-  /// The second half: their geometry.
-  void find_geometry(const Observation& seen, VerifiedCandidate& candidate,
-                     Verification& result) const {
-    const DecisionOptions& decision = options_.decision;
-    if (decision.count_matches) {
-      candidate.distinct_inliers = candidate.matches;
-      return;
-    }
-    verifier_.find_geometry(seen.features, features(candidate.candidate.place), result);
-    candidate.inliers = static_cast<int>(result.inliers.size());
-    candidate.distinct_inliers = result.distinct_inliers;
-    candidate.inlier_worth = inlier_worth(result.explained_share, seen.earlier_steps, decision);
-  }
-
-  /// The score if all matches were distinct inliers that explain all around them: no geometry can
-  /// lead to a higher one.
-  [[nodiscard]] double highest_score(VerifiedCandidate candidate, const Observation& seen) const {
-    candidate.distinct_inliers = candidate.matches;
-    candidate.inlier_worth = inlier_worth(1.0, seen.earlier_steps, options_.decision);
-    return agreement_.score(candidate, seen.look.is_step);
-  }
-
-  /// The candidates with enough inliers to show that their place has what the query has.
-  [[nodiscard]] std::vector<Sighting> sightings(const Observation& seen) const {
-    std::vector<Sighting> sightings;
-    for (std::size_t i = 0; i < seen.verified.size(); ++i) {
-      const VerifiedCandidate& v = seen.verified[i];
-      if (v.distinct_inliers < kMinSightingInliers) continue;
-      sightings.push_back({v.step, known_loops_.first_visit(v.step), verifications_[i].inliers});
-    }
-    std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
-      return std::pair(a.first_visit, a.step) < std::pair(b.first_visit, b.step);
-    });
-    return sightings;
-  }
-
-  void find_distinctness(const std::vector<Sighting>& others, VerifiedCandidate& candidate,
-                         const Verification& result) const {
-    candidate.distinctness = distinctness(
-        {candidate.step, known_loops_.first_visit(candidate.step), result.inliers}, others);
-  }
-
-  /// Of `matches`, those whose feature of the query is an inlier of a promising candidate.
-  [[nodiscard]] std::ptrdiff_t num_shared(const std::vector<Match>& matches) const {
-    return std::count_if(matches.begin(), matches.end(), [&](const Match& match) {
-      return is_promising_[static_cast<std::size_t>(match.query)];
-    });
-  }
-
-  /// Matches all candidates, which is cheap, and seeks the geometry of those with the most matches
-  /// first, until none of the others can have a higher score than the best. A candidate with more
-  /// evidence than chance gives is promising; then others that may have what it has are verified
-  /// all the same, to see how much of it they share. Those left out keep no inliers: they change
-  /// nothing now, and add nothing to the support of later matches.
-  void verify_candidates(const std::vector<Candidate>& candidates, Observation& seen) const {
-    verifications_.resize(std::max(verifications_.size(), candidates.size()));
-    std::vector<std::pair<double, std::size_t>> order;
-    for (const Candidate& candidate : candidates) {
-      const std::size_t i = seen.verified.size();
-      seen.verified.push_back(matched(seen.features, candidate, verifications_[i]));
-      order.emplace_back(-highest_score(seen.verified[i], seen), i);
-    }
-    std::sort(order.begin(), order.end());
-    double best = 0;
-    bool any_promising = false;
-    is_promising_.assign(seen.features.keypoints.size(), false);
-    for (const auto& [negative_bound, i] : order) {
-      const bool may_win = -negative_bound >= best;
-      if (!may_win && num_shared(verifications_[i].matches) < kMinSharedMatches) continue;
-      find_geometry(seen, seen.verified[i], verifications_[i]);
-      best = std::max(best, agreement_.score(seen.verified[i], seen.look.is_step));
-      if (seen.verified[i].evidence() <= options_.decision.chance_evidence) continue;
-      any_promising = true;
-      for (const Match& inlier : verifications_[i].inliers) {
-        is_promising_[static_cast<std::size_t>(inlier.query)] = true;
-      }
-    }
-    if (!any_promising || !options_.decision.distinctness) return;
-    seen.sightings = sightings(seen);
-    for (std::size_t i = 0; i < seen.verified.size(); ++i) {
-      find_distinctness(seen.sightings, seen.verified[i], verifications_[i]);
-    }
+  static CandidateVerifier::Query verified_query(const Observation& seen) {
+    return {seen.features, seen.look.is_step, seen.earlier_steps};
   }
 
   /// How far back the view of a new frame reaches.
@@ -386,29 +295,18 @@ class LoopDetector::Impl {
     return std::tuple(agreement_.score(v, seen.look.is_step), v.matches, v.candidate.similarity);
   }
 
-  /// Candidates stand apart; the best place of all may be a neighbour of one. Verifies those of the
-  /// best candidate, and takes the one with most inliers: all are the same place, or none.
-  [[nodiscard]] VerifiedCandidate refined(const VerifiedCandidate& candidate,
-                                          const Observation& seen, PlaceId end) const {
-    const auto closeness = [](const VerifiedCandidate& v) {
-      return std::tuple(v.distinct_inliers, v.inliers, v.candidate.similarity);
-    };
-    const PlaceId middle = candidate.candidate.place;
+  /// The places around a candidate. Candidates stand apart, so one of these may be the best.
+  [[nodiscard]] std::vector<Candidate> beside(PlaceId middle, PlaceId end,
+                                              const BinaryContent& content) const {
     const int radius = options_.retrieval.min_spacing;
-    VerifiedCandidate best = candidate;
+    std::vector<Candidate> places;
     for (PlaceId place = std::max(0, middle - radius); place <= std::min(end - 1, middle + radius);
          ++place) {
       if (place == middle) continue;
-      const double xi = similarity(seen.content, index_.content(place),
-                                   options_.retrieval.shift_tolerance_columns);
-      VerifiedCandidate neighbour = matched(seen.features, {place, xi}, verification_);
-      if (neighbour.matches < best.distinct_inliers) continue;
-      find_geometry(seen, neighbour, verification_);
-      if (closeness(neighbour) <= closeness(best)) continue;
-      find_distinctness(seen.sightings, neighbour, verification_);
-      best = neighbour;
+      places.push_back({place, similarity(content, index_.content(place),
+                                          options_.retrieval.shift_tolerance_columns)});
     }
-    return best;
+    return places;
   }
 
   [[nodiscard]] Status judged(VerifiedCandidate best, const Observation& seen) const {
@@ -430,7 +328,10 @@ class LoopDetector::Impl {
         [&](const auto& a, const auto& b) { return rank(a, seen) < rank(b, seen); });
     // Below, a neighbour is no likelier to be right than any other place.
     const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
-    if (score() > options_.decision.chance_evidence) best = refined(best, seen, end);
+    if (score() > options_.decision.chance_evidence) {
+      best = candidates_.closest(verified_query(seen), best,
+                                 beside(best.candidate.place, end, seen.content));
+    }
     seen.best = best;
     detection.score = score();
     detection.status = judged(best, seen);
@@ -454,9 +355,8 @@ class LoopDetector::Impl {
   // Working memory, which makes const functions unfit for threads.
   mutable SurfExtractor surf_;
   mutable Verifier verifier_;
-  mutable std::vector<Verification> verifications_;  ///< of the candidates of one frame
-  mutable std::vector<bool> is_promising_;           ///< by feature of it, see num_shared()
-  mutable Verification verification_;                ///< of one other place
+  mutable Verification verification_;  ///< of the query and a recent place
+  mutable CandidateVerifier candidates_;
 };
 
 LoopDetector::LoopDetector(const LoopDetectorOptions& options) : LoopDetector(options, nullptr) {}

@@ -14,6 +14,21 @@ bool is_distinct(const NearestTwo& nearest, std::size_t lane, double max_ratio) 
   return nearest.distance_sq[lane] < max_ratio * max_ratio * nearest.second_distance_sq[lane];
 }
 
+/// The descriptors of dark and of bright blobs.
+struct Groups {
+  std::span<const Descriptor> dark;
+  std::span<const Descriptor> bright;
+};
+
+/// The same part of each group, so that both together have `strongest` at most.
+Groups strongest_of(const Features& features, std::size_t strongest) {
+  const std::span<const Descriptor> all = features.descriptors;
+  const std::size_t total = std::max<std::size_t>(1, all.size());
+  const std::size_t kept = std::min(strongest, all.size());
+  const std::size_t dark = features.num_dark * kept / total;
+  return {all.first(dark), all.subspan(features.num_dark, kept - dark)};
+}
+
 }  // namespace
 
 void FeatureMatcher::find_constants(Descriptors descriptors) {
@@ -71,13 +86,13 @@ void FeatureMatcher::match_group(Descriptors query, Descriptors place, double ma
 }
 
 void FeatureMatcher::match(const Features& query, const Features& place, double max_ratio,
-                           std::vector<Match>& matches) {
+                           std::size_t strongest, std::vector<Match>& matches) {
   static_assert(sizeof(Descriptor) == kDescriptorSize);
-  const Descriptors of_query = query.descriptors;
-  const Descriptors of_place = place.descriptors;
-  match_group(of_query.first(query.num_dark), of_place.first(place.num_dark), max_ratio);
+  const Groups of_query = strongest_of(query, strongest);
+  const Groups of_place = strongest_of(place, strongest);
+  match_group(of_query.dark, of_place.dark, max_ratio);
   matches = matches_;
-  match_group(of_query.subspan(query.num_dark), of_place.subspan(place.num_dark), max_ratio);
+  match_group(of_query.bright, of_place.bright, max_ratio);
   for (const Match& match : matches_) {
     matches.push_back({match.query + static_cast<int>(query.num_dark),
                        match.place + static_cast<int>(place.num_dark)});

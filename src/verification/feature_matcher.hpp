@@ -17,7 +17,8 @@ class FeatureMatcher {
  public:
   explicit FeatureMatcher(const Kernels& kernels) : kernels_(kernels) {}
 
-  void match(const Features& query, const Features& place, double max_ratio,
+  /// Of `query` and `place`, about so many of the strongest features take part.
+  void match(const Features& query, const Features& place, double max_ratio, std::size_t strongest,
              std::vector<Match>& matches);
 
  private:

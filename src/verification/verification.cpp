@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "loopbit/kernels.hpp"
 
@@ -15,6 +16,8 @@ namespace {
 
 /// Seven matches always have an epipolar geometry, so only more can speak for one.
 constexpr std::size_t kMinMatchesForGeometry = 8;
+/// As many of the strongest features as there are.
+constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
 const Keypoint& keypoint(const Features& features, int index) {
   return features.keypoints[static_cast<std::size_t>(index)];
@@ -127,7 +130,13 @@ class Verifier::Impl {
   }
 
   void match(const Features& query, const Features& place, Verification& result) {
-    matcher_.match(query, place, options_.max_ratio, result.matches);
+    matcher_.match(query, place, options_.max_ratio, kAll, result.matches);
+    clear_geometry(result);
+  }
+
+  void match_strongest(const Features& query, const Features& place, Verification& result) {
+    matcher_.match(query, place, options_.max_ratio,
+                   static_cast<std::size_t>(options_.first_look_keypoints), result.matches);
     clear_geometry(result);
   }
 
@@ -163,13 +172,17 @@ void Verifier::match(const Features& query, const Features& place, Verification&
   impl_->match(query, place, result);
 }
 
+void Verifier::match_strongest(const Features& query, const Features& place, Verification& result) {
+  impl_->match_strongest(query, place, result);
+}
+
 void Verifier::find_geometry(const Features& query, const Features& place, Verification& result) {
   impl_->find_geometry(query, place, result);
 }
 
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio) {
   std::vector<Match> matches;
-  FeatureMatcher(active_kernels()).match(query, place, max_ratio, matches);
+  FeatureMatcher(active_kernels()).match(query, place, max_ratio, kAll, matches);
   return matches;
 }
 

@@ -23,6 +23,8 @@ struct Match {
 };
 
 struct VerificationOptions {
+  int first_look_keypoints = 120;
+  int max_closer_looks = 5;
   double max_ratio = 0.8;
   int min_matches = 8;
   double max_epipolar_error_px = 2.0;
@@ -31,6 +33,11 @@ struct VerificationOptions {
   static constexpr auto fields() {
     using S = VerificationOptions;
     return std::tuple{
+        Field{"first_look_keypoints", &S::first_look_keypoints, 16, 10000,
+              "strongest keypoints of either image that tell which candidates to look at closer"},
+        Field{"max_closer_looks", &S::max_closer_looks, 1, 1'000'000,
+              "candidates whose keypoints are all matched; others only where they seem to share "
+              "what these have"},
         Field{"max_ratio", &S::max_ratio, 0.1, 1.0,
               "a match is kept if its distance is less than this part of the second best"},
         Field{"min_matches", &S::min_matches, 8, 1000, "with fewer matches no geometry is sought"},
@@ -93,6 +100,9 @@ class Verifier {
 
   /// Sets `result.matches` (see match_features) and clears the rest.
   void match(const Features& query, const Features& place, Verification& result);
+
+  /// The same for the strongest `first_look_keypoints` features of each, in a fraction of the time.
+  void match_strongest(const Features& query, const Features& place, Verification& result);
 
   /// Sets the rest from `result.matches`; leaves it empty where they are fewer than min_matches.
   void find_geometry(const Features& query, const Features& place, Verification& result);

@@ -1,0 +1,225 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "candidate_verifier.hpp"
+
+#include <algorithm>
+#include <tuple>
+#include <utility>
+
+namespace loopbit {
+namespace {
+
+/// Different places share a few inliers by chance; with so many they share a thing.
+constexpr int kMinSightingInliers = 8;
+/// Fewer matches of what a promising candidate has are chance, and hardly change its distinctness.
+constexpr int kMinSharedMatches = 4;
+/// The same in the first look, which meets about half of them.
+constexpr int kMinSharedAtFirst = 2;
+/// Of the places beside a candidate, so many are looked at closer.
+constexpr std::size_t kMaxBeside = 4;
+
+}  // namespace
+
+CandidateVerifier::CandidateVerifier(const LoopDetectorOptions& options, Places places,
+                                     const Agreement& agreement, const KnownLoops& known_loops)
+    : options_(options),
+      places_(std::move(places)),
+      agreement_(agreement),
+      known_loops_(known_loops),
+      verifier_(options.verification) {}
+
+std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
+                                                         const std::vector<Candidate>& candidates) {
+  promising_.clear();
+  is_promising_.assign(query.features.keypoints.size(), false);
+  sightings_.clear();
+  std::vector<VerifiedCandidate> verified = unverified(candidates);
+  const std::vector<std::size_t> order = first_look(query, verified, verifications_);
+  const auto closer =
+      std::min(order.size(), static_cast<std::size_t>(options_.verification.max_closer_looks));
+  look_closer(query, std::span(order).first(closer), verified);
+  if (promising_.empty() || !options_.decision.distinctness) return verified;
+  look_at_others(query, std::span(order).subspan(closer), verified);
+  note_sightings(verified);
+  for (std::size_t i = 0; i < verified.size(); ++i) {
+    find_distinctness(verified[i], verifications_[i]);
+  }
+  return verified;
+}
+
+VerifiedCandidate CandidateVerifier::closest(const Query& query, const VerifiedCandidate& candidate,
+                                             const std::vector<Candidate>& beside) {
+  const auto closeness = [](const VerifiedCandidate& v) {
+    return std::tuple(v.distinct_inliers, v.inliers, v.candidate.similarity);
+  };
+  VerifiedCandidate best = candidate;
+  std::vector<VerifiedCandidate> neighbours = unverified(beside);
+  std::vector<std::size_t> order = first_look(query, neighbours, beside_);
+  order.resize(std::min(order.size(), kMaxBeside));
+  for (const std::size_t i : order) {
+    VerifiedCandidate& neighbour = neighbours[i];
+    match(query, neighbour, verification_);
+    if (neighbour.matches < best.distinct_inliers) continue;
+    find_geometry(query, neighbour, verification_);
+    if (closeness(neighbour) <= closeness(best)) continue;
+    find_distinctness(neighbour, verification_);
+    best = neighbour;
+  }
+  return best;
+}
+
+void CandidateVerifier::complete(const Query& query, std::vector<VerifiedCandidate>& verified) {
+  for (VerifiedCandidate& v : verified) {
+    if (v.inliers > 0) continue;
+    match(query, v, verification_);
+    find_geometry(query, v, verification_);
+  }
+}
+
+std::vector<VerifiedCandidate> CandidateVerifier::unverified(
+    const std::vector<Candidate>& candidates) const {
+  std::vector<VerifiedCandidate> unverified;
+  unverified.reserve(candidates.size());
+  for (const Candidate& candidate : candidates) {
+    unverified.push_back({candidate, places_.step_of(candidate.place)});
+  }
+  return unverified;
+}
+
+/// Indices into `verified`, those first that may be expected to have the highest scores: a place
+/// that shares keypoints shares strong ones, too. Leaves these matches in `looks`.
+std::vector<std::size_t> CandidateVerifier::first_look(
+    const Query& query, const std::vector<VerifiedCandidate>& verified,
+    std::vector<Verification>& looks) {
+  looks.resize(std::max(looks.size(), verified.size()));
+  const auto keypoints = static_cast<double>(query.features.keypoints.size());
+  const double looked_at = options_.verification.first_look_keypoints;
+  std::vector<std::pair<double, std::size_t>> scores;
+  scores.reserve(verified.size());
+  for (std::size_t i = 0; i < verified.size(); ++i) {
+    VerifiedCandidate expected = verified[i];
+    verifier_.match_strongest(query.features, places_.features(expected.candidate.place), looks[i]);
+    expected.distinct_inliers = static_cast<int>(looks[i].matches.size());
+    expected.inlier_worth = std::max(1.0, keypoints / looked_at);
+    scores.emplace_back(-agreement_.score(expected, query.is_step), i);
+  }
+  std::sort(scores.begin(), scores.end());
+  std::vector<std::size_t> order;
+  order.reserve(scores.size());
+  for (const auto& [negative_score, i] : scores) order.push_back(i);
+  return order;
+}
+
+/// The first half of the verification of a candidate: its matches.
+void CandidateVerifier::match(const Query& query, VerifiedCandidate& candidate,
+                              Verification& result) {
+  verifier_.match(query.features, places_.features(candidate.candidate.place), result);
+  candidate.matches = static_cast<int>(result.matches.size());
+}
+
+/// The second half: their geometry.
+void CandidateVerifier::find_geometry(const Query& query, VerifiedCandidate& candidate,
+                                      Verification& result) {
+  const DecisionOptions& decision = options_.decision;
+  if (decision.count_matches) {
+    candidate.distinct_inliers = candidate.matches;
+    return;
+  }
+  verifier_.find_geometry(query.features, places_.features(candidate.candidate.place), result);
+  candidate.inliers = static_cast<int>(result.inliers.size());
+  candidate.distinct_inliers = result.distinct_inliers;
+  candidate.inlier_worth = inlier_worth(result.explained_share, query.earlier_steps, decision);
+}
+
+/// The score if all matches were distinct inliers that explain all around them: no geometry can
+/// lead to a higher one.
+double CandidateVerifier::highest_score(const Query& query, VerifiedCandidate candidate) const {
+  candidate.distinct_inliers = candidate.matches;
+  candidate.inlier_worth = inlier_worth(1.0, query.earlier_steps, options_.decision);
+  return agreement_.score(candidate, query.is_step);
+}
+
+/// Matches in full, and seeks the geometry of those with the most matches first, until none of the
+/// others can have a higher score than the best. One with more evidence than chance gives is
+/// promising; then others that may have what it has elsewhere are verified all the same, to see how
+/// much of it they share.
+void CandidateVerifier::look_closer(const Query& query, std::span<const std::size_t> order,
+                                    std::vector<VerifiedCandidate>& verified) {
+  std::vector<std::pair<double, std::size_t>> bounds;
+  bounds.reserve(order.size());
+  for (const std::size_t i : order) {
+    match(query, verified[i], verifications_[i]);
+    bounds.emplace_back(-highest_score(query, verified[i]), i);
+  }
+  std::sort(bounds.begin(), bounds.end());
+  double best = 0;
+  for (const auto& [negative_bound, i] : bounds) {
+    const bool may_win = -negative_bound >= best;
+    const auto may_share = [&, place = i] {
+      return is_elsewhere(verified[place]) &&
+             num_shared(verifications_[place].matches) >= kMinSharedMatches;
+    };
+    if (!may_win && !may_share()) continue;
+    find_geometry(query, verified[i], verifications_[i]);
+    best = std::max(best, agreement_.score(verified[i], query.is_step));
+    note_promising(verified[i], verifications_[i]);
+  }
+}
+
+/// Verifies those that may have elsewhere what a promising candidate has.
+void CandidateVerifier::look_at_others(const Query& query, std::span<const std::size_t> order,
+                                       std::vector<VerifiedCandidate>& verified) {
+  for (const std::size_t i : order) {
+    if (!is_elsewhere(verified[i])) continue;
+    if (num_shared(verifications_[i].matches) < kMinSharedAtFirst) continue;
+    match(query, verified[i], verifications_[i]);
+    if (num_shared(verifications_[i].matches) < kMinSharedMatches) continue;
+    find_geometry(query, verified[i], verifications_[i]);
+    note_promising(verified[i], verifications_[i]);
+  }
+}
+
+void CandidateVerifier::note_promising(const VerifiedCandidate& candidate,
+                                       const Verification& result) {
+  if (candidate.evidence() <= options_.decision.chance_evidence) return;
+  promising_.push_back(spot_of(candidate));
+  for (const Match& inlier : result.inliers) {
+    is_promising_[static_cast<std::size_t>(inlier.query)] = true;
+  }
+}
+
+Spot CandidateVerifier::spot_of(const VerifiedCandidate& candidate) const {
+  return {candidate.step, known_loops_.first_visit(candidate.step)};
+}
+
+/// Whether it shows another place than each promising candidate, for all we know.
+bool CandidateVerifier::is_elsewhere(const VerifiedCandidate& candidate) const {
+  const Spot here = spot_of(candidate);
+  return std::none_of(promising_.begin(), promising_.end(),
+                      [&](const Spot& spot) { return is_same_place(here, spot); });
+}
+
+/// Of `matches`, those whose feature of the query is an inlier of a promising candidate.
+std::ptrdiff_t CandidateVerifier::num_shared(const std::vector<Match>& matches) const {
+  return std::count_if(matches.begin(), matches.end(), [&](const Match& match) {
+    return is_promising_[static_cast<std::size_t>(match.query)];
+  });
+}
+
+/// The candidates with enough inliers to show that their place has what the query has.
+void CandidateVerifier::note_sightings(const std::vector<VerifiedCandidate>& verified) {
+  for (std::size_t i = 0; i < verified.size(); ++i) {
+    if (verified[i].distinct_inliers < kMinSightingInliers) continue;
+    sightings_.push_back({spot_of(verified[i]), verifications_[i].inliers});
+  }
+  std::sort(sightings_.begin(), sightings_.end(), [](const Sighting& a, const Sighting& b) {
+    return std::pair(a.spot.first_visit, a.spot.step) < std::pair(b.spot.first_visit, b.spot.step);
+  });
+}
+
+void CandidateVerifier::find_distinctness(VerifiedCandidate& candidate,
+                                          const Verification& result) const {
+  candidate.distinctness = distinctness({spot_of(candidate), result.inliers}, sightings_);
+}
+
+}  // namespace loopbit

@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "loopbit/loop_detector_options.hpp"
+#include "loopbit/verification.hpp"
+
+#include "agreement.hpp"
+#include "distinctness.hpp"
+#include "known_loops.hpp"
+
+namespace loopbit {
+
+/// Step 3 for the candidates of one frame after another. A first look matches only the strongest
+/// keypoints of each; the few that it puts first are matched in full, and their geometry is sought
+/// while it can change the decision. Others are looked at closer only where they may have what a
+/// promising candidate has.
+class CandidateVerifier {
+ public:
+  struct Query {
+    const Features& features;
+    bool is_step = true;               ///< it changes the view, see Agreement::score
+    std::ptrdiff_t earlier_steps = 0;  ///< see inlier_worth()
+  };
+
+  /// What is known of places.
+  struct Places {
+    std::function<const Features&(PlaceId)> features;
+    std::function<std::ptrdiff_t(PlaceId)> step_of;  ///< see VerifiedCandidate::step
+  };
+
+  /// Keeps the references.
+  CandidateVerifier(const LoopDetectorOptions& options, Places places, const Agreement& agreement,
+                    const KnownLoops& known_loops);
+
+  /// The candidates, in their order. Those left out have no inliers, which changes nothing now, and
+  /// adds nothing to the support of later matches.
+  std::vector<VerifiedCandidate> verify(const Query& query,
+                                        const std::vector<Candidate>& candidates);
+
+  /// The one with most inliers of `candidate`, which verify() returned for this query, and of
+  /// places beside it: all are the same place, or none.
+  VerifiedCandidate closest(const Query& query, const VerifiedCandidate& candidate,
+                            const std::vector<Candidate>& beside);
+
+  /// Verifies in full those that verify() left out.
+  void complete(const Query& query, std::vector<VerifiedCandidate>& verified);
+
+ private:
+  [[nodiscard]] Spot spot_of(const VerifiedCandidate& candidate) const;
+  [[nodiscard]] std::vector<VerifiedCandidate> unverified(
+      const std::vector<Candidate>& candidates) const;
+  std::vector<std::size_t> first_look(const Query& query,
+                                      const std::vector<VerifiedCandidate>& verified,
+                                      std::vector<Verification>& looks);
+  void match(const Query& query, VerifiedCandidate& candidate, Verification& result);
+  void find_geometry(const Query& query, VerifiedCandidate& candidate, Verification& result);
+  void find_distinctness(VerifiedCandidate& candidate, const Verification& result) const;
+  [[nodiscard]] double highest_score(const Query& query, VerifiedCandidate candidate) const;
+  void look_closer(const Query& query, std::span<const std::size_t> order,
+                   std::vector<VerifiedCandidate>& verified);
+  void look_at_others(const Query& query, std::span<const std::size_t> order,
+                      std::vector<VerifiedCandidate>& verified);
+  void note_promising(const VerifiedCandidate& candidate, const Verification& result);
+  [[nodiscard]] bool is_elsewhere(const VerifiedCandidate& candidate) const;
+  [[nodiscard]] std::ptrdiff_t num_shared(const std::vector<Match>& matches) const;
+  void note_sightings(const std::vector<VerifiedCandidate>& verified);
+
+  const LoopDetectorOptions& options_;
+  Places places_;
+  const Agreement& agreement_;
+  const KnownLoops& known_loops_;
+  Verifier verifier_;
+  std::vector<Verification> verifications_;  ///< of the candidates of this frame
+  std::vector<Verification> beside_;         ///< first looks at the places beside one of them
+  Verification verification_;                ///< of one such place
+  std::vector<Spot> promising_;              ///< where promising candidates stand
+  std::vector<bool> is_promising_;           ///< by feature of the query: it is an inlier of one
+  std::vector<Sighting> sightings_;          ///< none if no candidate is promising
+};
+
+}  // namespace loopbit
