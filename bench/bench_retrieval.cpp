@@ -104,6 +104,7 @@ Asked ask(const PlaceIndex& index, const std::vector<BinaryContent>& queries) {
     }
     asked.ms.push_back(best_ms);
     const auto n = static_cast<std::int64_t>(queries.size());
+    asked.mean.coarse_stretches += work.coarse_stretches / n;
     for (std::size_t level = 0; level < work.stretches.size(); ++level) {
       asked.mean.stretches[level] += work.stretches[level] / n;
     }
@@ -162,11 +163,11 @@ struct Row {
 
 void print_kind(const char* kind, std::size_t places, const Asked& asked) {
   fmt::print(
-      "  {} places={} p50_ms={:.3f} p99_ms={:.3f} bounds_32={} bounds_16={} bounds_8={} "
-      "bounds_2={} contents={}\n",
-      kind, places, percentile(asked.ms, 0.5), percentile(asked.ms, 0.99), asked.mean.stretches[0],
-      asked.mean.stretches[1], asked.mean.stretches[2], asked.mean.stretches[3],
-      asked.mean.contents);
+      "  {} places={} p50_ms={:.3f} p99_ms={:.3f} coarse_32={} bounds_32={} bounds_16={} "
+      "bounds_8={} bounds_2={} contents={}\n",
+      kind, places, percentile(asked.ms, 0.5), percentile(asked.ms, 0.99),
+      asked.mean.coarse_stretches, asked.mean.stretches[0], asked.mean.stretches[1],
+      asked.mean.stretches[2], asked.mean.stretches[3], asked.mean.contents);
 }
 
 void measure(const PlaceIndex& index, const Queries& queries, Row& row) {

@@ -128,25 +128,41 @@ int sum_of_minima(const Counts& queries, std::size_t q, const Counts& records, s
   return sum;
 }
 
+/// Records of block counts in [0, 16], packed; 15 becomes 16 in `records`, too.
+Counts packed(Counts& records) {
+  Counts result(records.size() / 2);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    if (records[i] == 15) records[i] = 16;
+    const unsigned code = std::min<unsigned>(records[i], 15);
+    const std::size_t run = i / kPackedRun;
+    result[run / 2 * kPackedRun + i % kPackedRun] |=
+        static_cast<std::uint8_t>(run % 2 == 0 ? code : code << 4U);
+  }
+  return result;
+}
+
 /// What reaching_queries finds, from its definition; `records` are one after the other.
-void expect_reaching_queries(const Kernels& kernels, const Counts& queries, std::uint32_t among,
-                             const Counts& records, const std::vector<std::uint16_t>& least) {
+void expect_reaching_queries(const Kernels& kernels, const Counts& queries,
+                             const std::vector<std::uint16_t>& among, Counts records,
+                             const std::vector<std::uint16_t>& least) {
   const std::size_t num_records = records.size() / kBlockCounts;
+  const Counts all_packed = packed(records);
+  std::vector<const std::uint8_t*> addresses(num_records);
+  for (std::size_t i = 0; i < num_records; ++i) addresses[i] = &all_packed[i * kPackedBytes];
   std::vector<Reached> reached(num_records, {9999, 9999});
-  const Counts pairs = interleaved(records, kBlockCounts, 2, kPairedCounts);
-  kernels.reaching_queries(queries.data(), among, pairs.data(), num_records / 2, least.data(),
-                           reached.data());
+  kernels.reaching_queries(queries.data(), among.data(), addresses.data(), num_records,
+                           least.data(), reached.data());
   for (std::size_t i = 0; i < num_records; ++i) {
     int expected_largest = 0;
     unsigned expected = 0;
     for (std::size_t q = 0; q < queries.size() / kBlockCounts; ++q) {
-      if ((among >> q & 1U) == 0) continue;
+      if ((unsigned{among[i / 2]} >> q & 1U) == 0) continue;
       const int sum = sum_of_minima(queries, q, records, i, kBlockCounts);
       expected_largest = std::max(expected_largest, sum);
       if (sum >= least[i]) expected |= 1U << q;
     }
-    ASSERT_EQ(reached[i].largest_sum, expected_largest) << "record " << i << " among " << among;
-    ASSERT_EQ(reached[i].queries, expected) << "record " << i << " among " << among;
+    ASSERT_EQ(reached[i].largest_sum, expected_largest) << "record " << i << " of " << num_records;
+    ASSERT_EQ(reached[i].queries, expected) << "record " << i << " of " << num_records;
   }
 }
 
@@ -295,11 +311,11 @@ TEST_P(EveryKernel, ReadsDescriptorsAtAnyByte) {
 
 TEST_P(EveryKernel, SumsTheMinimaOfEachPairOfCounts) {
   for (std::size_t k = 0; k < kBlockCounts; ++k) {
-    Counts one(2 * kBlockCounts, 0);
-    one[k] = 20;
-    one[kBlockCounts + k] = 5;
-    const Counts full(kBlockCounts, 32);
-    expect_reaching_queries(*GetParam(), full, 1, one, {20, 6});
+    Counts two(2 * kBlockCounts, 0);
+    two[k] = 14;
+    two[kBlockCounts + k] = 5;
+    const Counts full(kBlockCounts, 16);
+    expect_reaching_queries(*GetParam(), full, {1}, two, {14, 6});
   }
   for (std::size_t k = 0; k < kCoarseCounts * kInterleaved; ++k) {
     Counts one(kCoarseCounts * kInterleaved, 0);
@@ -309,23 +325,47 @@ TEST_P(EveryKernel, SumsTheMinimaOfEachPairOfCounts) {
 }
 
 TEST_P(EveryKernel, SumsTheLargestCounts) {
-  const Counts full(4 * kBlockCounts, 32);
-  expect_reaching_queries(*GetParam(), full, 0b1111, full, {4096, 4095, 4097, 0});
-  expect_reaching_queries(*GetParam(), full, 0, full, {0, 1, 2, 3});
+  const Counts full(4 * kBlockCounts, 16);
+  expect_reaching_queries(*GetParam(), full, {0b1111, 0b0101}, full, {4096, 4095, 4097, 0});
+  expect_reaching_queries(*GetParam(), full, {0, 0b1000}, full, {0, 1, 2, 3});
   const Counts full_groups(2 * kInterleaved * kCoarseCounts, 64);
   expect_largest_coarse_sums(*GetParam(), Counts(3 * kCoarseCounts, 64), full_groups);
   expect_largest_coarse_sums(*GetParam(), {}, full_groups);
   expect_largest_coarse_sums(*GetParam(), full, {});
 }
 
+TEST_P(EveryKernel, TakesA15InARecordFor16) {
+  const Counts query(kBlockCounts, 16);
+  const Counts record(kBlockCounts, 15);
+  expect_reaching_queries(*GetParam(), query, {1}, record, {4096});
+  expect_reaching_queries(*GetParam(), Counts(kBlockCounts, 15), {1}, record, {15 * 256});
+}
+
+TEST_P(EveryKernel, SumsCoarseCountsWhereQueriesHaveAny) {
+  Random random;
+  const Counts records = random_counts(random, kInterleaved * kCoarseCounts, 64);
+  for (std::size_t filled = 1; filled <= kCoarseCounts; ++filled) {
+    Counts queries(2 * kCoarseCounts, 0);
+    queries[filled - 1] = 64;
+    for (std::size_t k = kCoarseCounts - filled; k < kCoarseCounts; ++k) {
+      queries[kCoarseCounts + k] = 40;
+    }
+    expect_largest_coarse_sums(*GetParam(), queries, records);
+  }
+}
+
 TEST_P(EveryKernel, FindsTheQueriesThatReachWhatARecordNeeds) {
   Random random;
-  for (const int largest : {3, 32}) {
-    for (const std::size_t num_pairs : {1U, 2U, 3U, 8U}) {
-      for (const std::uint32_t among : {0x1U, 0x1FFU, 0x124U, 0x8001U, 0xFFFFU}) {
+  for (const int largest : {3, 16}) {
+    for (const std::size_t num_records : {0U, 1U, 2U, 3U, 4U, 15U, 32U}) {
+      for (const std::uint32_t of_first : {0x1U, 0x1FFU, 0x124U, 0x8001U, 0xFFFFU}) {
         const Counts queries = random_counts(random, 16 * kBlockCounts, largest);
-        const Counts records = random_counts(random, 2 * num_pairs * kBlockCounts, largest);
-        std::vector<std::uint16_t> least(2 * num_pairs);
+        const Counts records = random_counts(random, num_records * kBlockCounts, largest);
+        std::vector<std::uint16_t> among((num_records + 1) / 2);
+        for (std::size_t i = 0; i < among.size(); ++i) {
+          among[i] = static_cast<std::uint16_t>(of_first << i | of_first >> (16 - i));
+        }
+        std::vector<std::uint16_t> least(num_records);
         // Some records need just what one of the queries has.
         for (std::size_t i = 0; i < least.size(); ++i) {
           least[i] = static_cast<std::uint16_t>(
@@ -352,23 +392,28 @@ TEST_P(EveryKernel, FindsTheLargestCoarseSums) {
 
 TEST_P(EveryKernel, SelectsTheSumsWithinLimits) {
   Random random;
-  std::vector<std::uint16_t> sums(80);
+  std::vector<std::uint16_t> sums(5 * kInterleaved);
   std::generate(sums.begin(), sums.end(),
                 [&] { return static_cast<std::uint16_t>(random.between(0, 4096)); });
   sums[17] = 1;
   sums[18] = 4096;
-  for (const auto& [lower, upper] : {std::pair{1, 4097}, {1, 1}, {2000, 3000}, {4096, 4097}}) {
+  std::vector<std::uint16_t> largest;
+  for (auto group = sums.begin(); group != sums.end(); group += kInterleaved) {
+    largest.push_back(*std::max_element(group, group + kInterleaved));
+  }
+  for (const auto& [lower, upper] :
+       {std::pair{0, 32'767}, {1, 4097}, {1, 1}, {2000, 3000}, {4000, 4096}, {4096, 4097}}) {
     std::vector<std::uint32_t> expected;
     for (std::uint32_t i = 0; i < sums.size(); ++i) {
       if (sums[i] >= lower && sums[i] < upper) expected.push_back(i);
     }
     std::vector<std::uint32_t> numbers(sums.size());
-    numbers.resize(GetParam()->select_sums(sums.data(), sums.size(),
+    numbers.resize(GetParam()->select_sums(sums.data(), largest.data(), largest.size(),
                                            static_cast<std::uint16_t>(lower),
                                            static_cast<std::uint16_t>(upper), numbers.data()));
     EXPECT_EQ(numbers, expected) << lower << " to " << upper;
   }
-  EXPECT_EQ(GetParam()->select_sums(nullptr, 0, 1, 2, nullptr), 0U);
+  EXPECT_EQ(GetParam()->select_sums(nullptr, nullptr, 0, 1, 2, nullptr), 0U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, EveryKernel,

@@ -211,11 +211,11 @@ TEST(PlaceIndex, TellsWhatItLookedAt) {
   const PlaceIndex index = index_of(coherent_contents(random, 1'030));
   RetrievalWork work;
   static_cast<void>(index.query(index.content(100), 1'030, {.max_candidates = 1}, &work));
-  EXPECT_EQ(work.stretches[0], 32);  // whole groups of 16, of 32 places each
+  EXPECT_EQ(work.coarse_stretches, 32);  // whole groups of 16, of 32 places each
   EXPECT_GT(work.contents, 0);
   EXPECT_LT(work.contents, 300);
   static_cast<void>(index.query(BinaryContent{}, 1'030, {}, &work));
-  EXPECT_EQ(work.stretches[0], 0);
+  EXPECT_EQ(work.coarse_stretches, 0);
   EXPECT_EQ(work.contents, 0);
 }
 

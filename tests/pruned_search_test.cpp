@@ -182,6 +182,74 @@ TEST(PrunedSearch, OfEqualPlacesLooksAtFew) {
   EXPECT_LT(search.work().contents, 500);
 }
 
+Stretch stretch_of(std::size_t number, int sum, int larger_count) {
+  return {.number = static_cast<std::uint32_t>(number),
+          .sum = static_cast<std::uint16_t>(sum),
+          .larger_count = static_cast<std::uint16_t>(larger_count),
+          .shifts = 1};
+}
+
+TEST(StretchQueue, GivesLargeBoundsFirstAndCoarseLevelsFirst) {
+  StretchQueue queue;
+  queue.push(1, stretch_of(7, 50, 100));
+  queue.push(0, stretch_of(8, 50, 100));
+  queue.push(3, stretch_of(9, 90, 100));
+  queue.push(2, stretch_of(10, 120, 100));
+  for (const auto& [level, number] : {std::pair{2U, 10U}, {3U, 9U}, {0U, 8U}, {1U, 7U}}) {
+    std::vector<Stretch> taken;
+    EXPECT_EQ(queue.pop(0.0, taken), level);
+    ASSERT_EQ(taken.size(), 1U);
+    EXPECT_EQ(taken.front().number, number);
+  }
+}
+
+TEST(StretchQueue, GivesWhatReachesTheLeastBound) {
+  StretchQueue queue;
+  std::vector<Stretch> taken;
+  queue.pop(0.0, taken);
+  EXPECT_TRUE(taken.empty());
+  for (const int larger : {1, 7, 64, 100, 817, 4096}) {
+    for (int sum = 0; sum <= larger; ++sum) {
+      const double bound = static_cast<double>(sum) / larger;
+      queue.push(0, stretch_of(0, sum, larger));
+      queue.pop(bound + 0.1, taken);
+      ASSERT_TRUE(taken.empty()) << sum << " of " << larger;
+      queue.pop(bound, taken);
+      ASSERT_EQ(taken.size(), 1U) << sum << " of " << larger;
+      ASSERT_EQ(taken.front().sum, sum);
+    }
+  }
+}
+
+TEST(StretchQueue, GivesEachStretchOnce) {
+  Random random;
+  StretchQueue queue;
+  std::vector<Stretch> taken;
+  std::vector<int> times(3'000);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    queue.push(i % 4, stretch_of(i, random.between(0, 500), 400));
+    if (i % 10 != 0) continue;
+    queue.pop(0.3, taken);
+    for (const Stretch& stretch : taken) ++times[stretch.number];
+  }
+  do {
+    queue.pop(0.0, taken);
+    for (const Stretch& stretch : taken) ++times[stretch.number];
+  } while (!taken.empty());
+  EXPECT_EQ(times, std::vector<int>(times.size(), 1));
+}
+
+/// The sum of the minima as a kernel finds it for packed counts.
+int packed_sum(const BlockCounts& query, const BlockCounts& counts) {
+  const PackedCounts record = packed(counts);
+  const std::uint8_t* address = record.of.data();
+  const std::uint16_t among = 1;
+  const std::uint16_t least = 0;
+  Reached reached{};
+  active_kernels().reaching_queries(query.of.data(), &among, &address, 1, &least, &reached);
+  return reached.largest_sum;
+}
+
 TEST(BlockCounts, BoundTheOverlap) {
   Random random;
   for (int i = 0; i < 200; ++i) {
@@ -191,9 +259,11 @@ TEST(BlockCounts, BoundTheOverlap) {
     const BlockCounts of_b = block_counts(b);
     int sum = 0;
     int bound = 0;
+    int expected_packed = 0;
     for (std::size_t k = 0; k < of_a.of.size(); ++k) {
       sum += of_a.of[k];
       bound += std::min(of_a.of[k], of_b.of[k]);
+      expected_packed += of_b.of[k] == 15 ? of_a.of[k] : std::min(of_a.of[k], of_b.of[k]);
     }
     const CoarseCounts coarse_a = coarse_counts(of_a);
     const CoarseCounts coarse_b = coarse_counts(of_b);
@@ -207,6 +277,7 @@ TEST(BlockCounts, BoundTheOverlap) {
     EXPECT_EQ(coarse_sum, count(a));
     EXPECT_GE(bound, similarity(a, b) * std::max(count(a), count(b)));
     EXPECT_GE(coarse_bound, bound);
+    EXPECT_EQ(packed_sum(of_a, of_b), expected_packed);
   }
 }
 

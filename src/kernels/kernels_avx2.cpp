@@ -155,30 +155,52 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   }
 }
 
-/// Two records of block counts. Four minima of at most 32 fit in 8 bits.
+/// Two records of block counts. Eight minima of at most 16 fit in 8 bits.
 struct Pair {
   struct Lanes {
     __m256i first;
     __m256i second;
   };
+  using Parts = __m256i[kBlockCounts / kPackedRun];
 
-  const std::uint8_t* counts;
+  Parts first;
+  Parts second;
 
-  static Pair load(const std::uint8_t* pair) { return {pair}; }
+  Pair(const std::uint8_t* first_record, const std::uint8_t* second_record) {
+    unpack(first_record, first);
+    unpack(second_record, second);
+  }
+
+  static void unpack(const std::uint8_t* record, Parts& parts) {
+    const __m256i counts =
+        _mm256_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16,  //
+                         0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16);
+    const __m256i low_nibbles = _mm256_set1_epi8(15);
+    for (std::size_t byte = 0; byte < kPackedBytes; byte += kPackedRun) {
+      const __m256i packed = load(record + byte);
+      const __m256i lower = _mm256_and_si256(packed, low_nibbles);
+      const __m256i upper = _mm256_and_si256(_mm256_srli_epi16(packed, 4), low_nibbles);
+      __m256i* const part = parts + 2 * byte / kPackedRun;
+      part[0] = _mm256_shuffle_epi8(counts, lower);
+      part[1] = _mm256_shuffle_epi8(counts, upper);
+    }
+  }
+
+  static __m256i beside(__m256i sums, const Parts& parts, const std::uint8_t* query) {
+    const auto minimum = [&](std::size_t i) {
+      return _mm256_min_epu8(parts[i], load(query + i * kPackedRun));
+    };
+    const auto minima_of_4 = [&](std::size_t i) {
+      return _mm256_add_epi8(_mm256_add_epi8(minimum(i), minimum(i + 1)),
+                             _mm256_add_epi8(minimum(i + 2), minimum(i + 3)));
+    };
+    const __m256i minima = _mm256_add_epi8(minima_of_4(0), minima_of_4(4));
+    return _mm256_or_si256(_mm256_slli_epi64(sums, 16),
+                           _mm256_sad_epu8(minima, _mm256_setzero_si256()));
+  }
 
   void add_min_sums(const std::uint8_t* query, Lanes& lanes) const {
-    const auto beside = [&](__m256i sums, std::size_t record) {
-      const auto minimum = [&](std::size_t first) {
-        return _mm256_min_epu8(loopbit::load(counts + 2 * first + record * kPairedCounts),
-                               loopbit::load(query + first));
-      };
-      const __m256i minima =
-          _mm256_add_epi8(_mm256_add_epi8(minimum(0), minimum(kPairedCounts)),
-                          _mm256_add_epi8(minimum(2 * kPairedCounts), minimum(3 * kPairedCounts)));
-      return _mm256_or_si256(_mm256_slli_epi64(sums, 16),
-                             _mm256_sad_epu8(minima, _mm256_setzero_si256()));
-    };
-    lanes = {beside(lanes.first, 0), beside(lanes.second, 1)};
+    lanes = {beside(lanes.first, first, query), beside(lanes.second, second, query)};
   }
 
   static __m128i reduce(const Lanes& lanes) {
@@ -201,15 +223,16 @@ __m256i four_counts(const std::uint8_t* query, std::size_t first) {
 }
 
 /// The sums of the minima of a query with 8 records, in 32-bit lanes.
-__m256i coarse_sums_with_eight(const std::uint8_t* query, const std::uint8_t* half) {
-  constexpr std::size_t kStride = kInterleaved * kCountsAtOnce;
+__m256i coarse_sums_with_eight(const std::uint8_t* query, const std::uint8_t* half,
+                               const CoarseChunks& chunks) {
+  const auto minimum = [&](std::size_t chunk) {
+    return _mm256_min_epu8(load(half + chunk * kInterleaved * kCountsAtOnce),
+                           four_counts(query, chunk * kCountsAtOnce));
+  };
   __m256i sums = _mm256_setzero_si256();
-  for (std::size_t first = 0; first < kCoarseCounts; first += 2 * kCountsAtOnce) {
-    const std::uint8_t* counts = half + first * kInterleaved;
-    const __m256i low = _mm256_min_epu8(load(counts), four_counts(query, first));
-    const __m256i high =
-        _mm256_min_epu8(load(counts + kStride), four_counts(query, first + kCountsAtOnce));
-    const __m256i both = _mm256_add_epi8(low, high);
+  for (std::size_t i = 0; i < chunks.size; i += 2) {
+    const __m256i both =
+        _mm256_add_epi8(minimum(chunks.numbers[i]), minimum(chunks.numbers[i + 1]));
     sums = _mm256_add_epi16(sums, _mm256_maddubs_epi16(both, _mm256_set1_epi8(1)));
   }
   return _mm256_madd_epi16(sums, _mm256_set1_epi16(1));
@@ -219,14 +242,15 @@ void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
                          const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
                          std::uint16_t* largest) {
   constexpr std::size_t kHalf = kInterleaved / 2 * kCountsAtOnce;
+  const CoarseChunks chunks = chunks_of(queries, num_queries);
   for (std::size_t group = 0; group < num_groups; ++group) {
     const std::uint8_t* counts = groups + group * kInterleaved * kCoarseCounts;
     __m256i low = _mm256_setzero_si256();
     __m256i high = _mm256_setzero_si256();
     for (std::size_t q = 0; q < num_queries; ++q) {
       const std::uint8_t* query = queries + q * kCoarseCounts;
-      low = _mm256_max_epi32(low, coarse_sums_with_eight(query, counts));
-      high = _mm256_max_epi32(high, coarse_sums_with_eight(query, counts + kHalf));
+      low = _mm256_max_epi32(low, coarse_sums_with_eight(query, counts, chunks));
+      high = _mm256_max_epi32(high, coarse_sums_with_eight(query, counts + kHalf, chunks));
     }
     // Packing takes halves of the registers in turn.
     const __m256i best =
@@ -234,6 +258,29 @@ void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + group * kInterleaved), best);
     largest[group] = largest_of_16(best);
   }
+}
+
+std::size_t select_sums(const std::uint16_t* sums, const std::uint16_t* largest,
+                        std::size_t num_groups, std::uint16_t lower, std::uint16_t upper,
+                        std::uint32_t* numbers) {
+  const __m256i first = _mm256_set1_epi16(static_cast<std::int16_t>(lower - 1));
+  const __m256i last = _mm256_set1_epi16(static_cast<std::int16_t>(upper));
+  std::size_t selected = 0;
+  for (std::size_t group = 0; group < num_groups; ++group) {
+    if (largest[group] < lower) continue;
+    const std::size_t i = group * kInterleaved;
+    const __m256i here = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(sums + i));
+    const __m256i between =
+        _mm256_and_si256(_mm256_cmpgt_epi16(here, first), _mm256_cmpgt_epi16(last, here));
+    const __m128i bytes =
+        _mm_packs_epi16(_mm256_castsi256_si128(between), _mm256_extracti128_si256(between, 1));
+    for (auto left = static_cast<std::uint32_t>(_mm_movemask_epi8(bytes)); left != 0;
+         left &= left - 1) {
+      numbers[selected++] =
+          static_cast<std::uint32_t>(i) + static_cast<std::uint32_t>(__builtin_ctz(left));
+    }
+  }
+  return selected;
 }
 
 }  // namespace

@@ -125,28 +125,39 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   _mm512_store_si512(nearest.second_distance_sq, absolute(two.second));
 }
 
-/// Two records of block counts, side by side. Four minima of at most 32 fit in 8 bits.
+/// Two records of block counts, side by side. Eight minima of at most 16 fit in 8 bits.
 struct Pair {
   using Lanes = __m512i;
-  static constexpr std::size_t kParts = kBlockCounts / kPairedCounts;
+  static constexpr std::size_t kParts = kBlockCounts / kPackedRun;
 
   __m512i parts[kParts];
 
-  static Pair load(const std::uint8_t* pair) {
-    Pair loaded;
-    for (std::size_t i = 0; i < kParts; ++i) {
-      loaded.parts[i] = _mm512_loadu_si512(pair + i * 2 * kPairedCounts);
+  Pair(const std::uint8_t* first, const std::uint8_t* second) {
+    const __m512i counts =
+        _mm512_broadcast_i32x4(_mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16));
+    const __m512i low_nibbles = _mm512_set1_epi8(15);
+    for (std::size_t i = 0; i < kParts; i += 2) {
+      const auto half = [&](const std::uint8_t* record) {
+        return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(record + i / 2 * kPackedRun));
+      };
+      const __m512i both = _mm512_inserti64x4(_mm512_castsi256_si512(half(first)), half(second), 1);
+      const __m512i lower = _mm512_and_si512(both, low_nibbles);
+      const __m512i upper = _mm512_and_si512(_mm512_srli_epi16(both, 4), low_nibbles);
+      parts[i] = _mm512_shuffle_epi8(counts, lower);
+      parts[i + 1] = _mm512_shuffle_epi8(counts, upper);
     }
-    return loaded;
   }
 
   void add_min_sums(const std::uint8_t* query, Lanes& lanes) const {
     const auto minimum = [&](std::size_t i) {
-      const auto* counts = reinterpret_cast<const __m256i*>(query + i * kPairedCounts);
+      const auto* counts = reinterpret_cast<const __m256i*>(query + i * kPackedRun);
       return _mm512_min_epu8(parts[i], _mm512_broadcast_i64x4(_mm256_loadu_si256(counts)));
     };
-    const __m512i minima = _mm512_add_epi8(_mm512_add_epi8(minimum(0), minimum(1)),
-                                           _mm512_add_epi8(minimum(2), minimum(3)));
+    const auto minima_of_4 = [&](std::size_t i) {
+      return _mm512_add_epi8(_mm512_add_epi8(minimum(i), minimum(i + 1)),
+                             _mm512_add_epi8(minimum(i + 2), minimum(i + 3)));
+    };
+    const __m512i minima = _mm512_add_epi8(minima_of_4(0), minima_of_4(4));
     lanes = _mm512_or_si512(_mm512_slli_epi64(lanes, 16),
                             _mm512_sad_epu8(minima, _mm512_setzero_si512()));
   }
@@ -164,17 +175,20 @@ struct Pair {
 
 /// `best`, raised to the sums of the minima of Count queries with 16 records.
 template <std::size_t Count>
-__m512i larger_coarse_sums(const std::uint8_t* queries, const std::uint8_t* group, __m512i best) {
+__m512i larger_coarse_sums(const std::uint8_t* queries, const std::uint8_t* group,
+                           const CoarseChunks& chunks, __m512i best) {
   constexpr std::size_t kStride = kInterleaved * kCountsAtOnce;
   __m512i sums[Count];
   for (std::size_t q = 0; q < Count; ++q) sums[q] = _mm512_setzero_si512();
-  for (std::size_t c = 0; c < kCoarseCounts / kCountsAtOnce; c += 2) {
+  for (std::size_t i = 0; i < chunks.size; i += 2) {
+    const std::size_t c = chunks.numbers[i];
+    const std::size_t d = chunks.numbers[i + 1];
     const __m512i low = _mm512_loadu_si512(group + c * kStride);
-    const __m512i high = _mm512_loadu_si512(group + (c + 1) * kStride);
+    const __m512i high = _mm512_loadu_si512(group + d * kStride);
     for (std::size_t q = 0; q < Count; ++q) {
       const auto* query = reinterpret_cast<const std::int8_t*>(queries + q * kCoarseCounts);
       const __m512i both = _mm512_add_epi8(_mm512_min_epu8(low, chunk(query, c)),
-                                           _mm512_min_epu8(high, chunk(query, c + 1)));
+                                           _mm512_min_epu8(high, chunk(query, d)));
       sums[q] = _mm512_dpbusd_epi32(sums[q], both, _mm512_set1_epi8(1));
     }
   }
@@ -186,20 +200,42 @@ void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
                          const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
                          std::uint16_t* largest) {
   constexpr std::size_t kQueriesAtOnce = 3;
+  const CoarseChunks chunks = chunks_of(queries, num_queries);
   for (std::size_t group = 0; group < num_groups; ++group) {
     const std::uint8_t* counts = groups + group * kInterleaved * kCoarseCounts;
     __m512i best = _mm512_setzero_si512();
     std::size_t q = 0;
     for (; q + kQueriesAtOnce <= num_queries; q += kQueriesAtOnce) {
-      best = larger_coarse_sums<kQueriesAtOnce>(queries + q * kCoarseCounts, counts, best);
+      best = larger_coarse_sums<kQueriesAtOnce>(queries + q * kCoarseCounts, counts, chunks, best);
     }
     for (; q < num_queries; ++q) {
-      best = larger_coarse_sums<1>(queries + q * kCoarseCounts, counts, best);
+      best = larger_coarse_sums<1>(queries + q * kCoarseCounts, counts, chunks, best);
     }
     const __m256i packed = _mm512_cvtepi32_epi16(best);
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + group * kInterleaved), packed);
     largest[group] = largest_of_16(packed);
   }
+}
+
+std::size_t select_sums(const std::uint16_t* sums, const std::uint16_t* largest,
+                        std::size_t num_groups, std::uint16_t lower, std::uint16_t upper,
+                        std::uint32_t* numbers) {
+  const __m512i order = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  const __m256i first = _mm256_set1_epi16(static_cast<std::int16_t>(lower));
+  const __m256i last = _mm256_set1_epi16(static_cast<std::int16_t>(upper));
+  std::size_t selected = 0;
+  for (std::size_t group = 0; group < num_groups; ++group) {
+    if (largest[group] < lower) continue;
+    const std::size_t i = group * kInterleaved;
+    const __m256i here = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(sums + i));
+    const __mmask16 between =
+        _mm256_mask_cmplt_epu16_mask(_mm256_cmpge_epu16_mask(here, first), here, last);
+    const __m512i all = _mm512_add_epi32(order, _mm512_set1_epi32(static_cast<int>(i)));
+    // What lies behind the selected ones is overwritten, and there is room for it.
+    _mm512_storeu_si512(numbers + selected, _mm512_maskz_compress_epi32(between, all));
+    selected += static_cast<std::size_t>(__builtin_popcount(between));
+  }
+  return selected;
 }
 
 }  // namespace

@@ -53,27 +53,32 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   }
 }
 
-/// The sum of the minima with one record of a pair.
-unsigned paired_sum(const std::uint8_t* query, const std::uint8_t* pair, std::size_t record) {
+/// The smaller of a count and one that is packed in 4 bits.
+unsigned smaller(unsigned count, unsigned packed) {
+  return packed == 15 || count < packed ? count : packed;
+}
+
+/// The sum of the minima of a query and a packed record.
+unsigned packed_sum(const std::uint8_t* query, const std::uint8_t* record) {
   unsigned sum = 0;
-  for (std::size_t first = 0; first < kBlockCounts; first += kPairedCounts) {
-    const std::uint8_t* counts = pair + 2 * first + record * kPairedCounts;
-    for (std::size_t k = 0; k < kPairedCounts; ++k) {
-      sum += query[first + k] < counts[k] ? query[first + k] : counts[k];
-    }
+  for (std::size_t byte = 0; byte < kPackedBytes; ++byte) {
+    const std::size_t lower = byte + byte / kPackedRun * kPackedRun;
+    const unsigned packed = record[byte];
+    sum += smaller(query[lower], packed & 15U) + smaller(query[lower + kPackedRun], packed >> 4U);
   }
   return sum;
 }
 
-void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const std::uint8_t* pairs,
-                      std::size_t num_pairs, const std::uint16_t* least, Reached* reached) {
-  for (std::size_t i = 0; i < 2 * num_pairs; ++i) {
+void reaching_queries(const std::uint8_t* queries, const std::uint16_t* among,
+                      const std::uint8_t* const* records, std::size_t num_records,
+                      const std::uint16_t* least, Reached* reached) {
+  for (std::size_t i = 0; i < num_records; ++i) {
+    const unsigned asked = among[i / 2];
     unsigned best = 0;
     unsigned bits = 0;
-    for (std::size_t q = 0; among >> q != 0; ++q) {
-      if ((among >> q & 1U) == 0) continue;
-      const unsigned sum =
-          paired_sum(queries + q * kBlockCounts, pairs + i / 2 * 2 * kBlockCounts, i % 2);
+    for (std::size_t q = 0; asked >> q != 0; ++q) {
+      if ((asked >> q & 1U) == 0) continue;
+      const unsigned sum = packed_sum(queries + q * kBlockCounts, records[i]);
       best = sum > best ? sum : best;
       if (sum >= least[i]) bits |= 1U << q;
     }
@@ -111,11 +116,15 @@ void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
   }
 }
 
-std::size_t select_sums(const std::uint16_t* sums, std::size_t num_sums, std::uint16_t lower,
-                        std::uint16_t upper, std::uint32_t* numbers) {
+std::size_t select_sums(const std::uint16_t* sums, const std::uint16_t* largest,
+                        std::size_t num_groups, std::uint16_t lower, std::uint16_t upper,
+                        std::uint32_t* numbers) {
   std::size_t selected = 0;
-  for (std::size_t i = 0; i < num_sums; ++i) {
-    if (sums[i] >= lower && sums[i] < upper) numbers[selected++] = static_cast<std::uint32_t>(i);
+  for (std::size_t group = 0; group < num_groups; ++group) {
+    if (largest[group] < lower) continue;
+    for (std::size_t i = group * kInterleaved; i < (group + 1) * kInterleaved; ++i) {
+      if (sums[i] >= lower && sums[i] < upper) numbers[selected++] = static_cast<std::uint32_t>(i);
+    }
   }
   return selected;
 }

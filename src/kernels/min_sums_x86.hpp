@@ -17,42 +17,53 @@ static std::uint16_t largest_of_16(__m256i values) {
   return static_cast<std::uint16_t>(~static_cast<unsigned>(_mm_cvtsi128_si32(smallest)));
 }
 
-static std::size_t select_sums(const std::uint16_t* sums, std::size_t num_sums, std::uint16_t lower,
-                               std::uint16_t upper, std::uint32_t* numbers) {
-  const __m256i first = _mm256_set1_epi16(static_cast<std::int16_t>(lower - 1));
-  const __m256i last = _mm256_set1_epi16(static_cast<std::int16_t>(upper));
-  std::size_t selected = 0;
-  for (std::size_t i = 0; i < num_sums; i += 16) {
-    const __m256i here = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(sums + i));
-    const __m256i between =
-        _mm256_and_si256(_mm256_cmpgt_epi16(here, first), _mm256_cmpgt_epi16(last, here));
-    const __m128i bytes =
-        _mm_packs_epi16(_mm256_castsi256_si128(between), _mm256_extracti128_si256(between, 1));
-    for (auto left = static_cast<std::uint32_t>(_mm_movemask_epi8(bytes)); left != 0;
-         left &= left - 1) {
-      numbers[selected++] =
-          static_cast<std::uint32_t>(i) + static_cast<std::uint32_t>(__builtin_ctz(left));
+/// The chunks of four coarse counts in which any query has one, and perhaps one more so that their
+/// number is even: the others add nothing to a sum.
+struct CoarseChunks {
+  std::size_t size;
+  std::size_t numbers[kCoarseCounts / kCountsAtOnce];
+};
+
+static CoarseChunks chunks_of(const std::uint8_t* queries, std::size_t num_queries) {
+  constexpr std::size_t kAll = kCoarseCounts / kCountsAtOnce;
+  CoarseChunks chunks{};
+  std::size_t first_empty = kAll;
+  for (std::size_t c = 0; c < kAll; ++c) {
+    std::uint32_t any = 0;
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      std::uint32_t counts = 0;
+      __builtin_memcpy(&counts, queries + q * kCoarseCounts + c * kCountsAtOnce, sizeof counts);
+      any |= counts;
     }
+    chunks.numbers[any != 0 ? chunks.size++ : --first_empty] = c;
   }
-  return selected;
+  chunks.size += chunks.size % 2;
+  return chunks;
 }
 
 /// Kernels::reaching_queries on top of one variant's Pair, a type of internal linkage for the
-/// reason that kernel_variants.hpp gives: it sums the minima in 64-bit lanes, of which four queries
-/// share the 16-bit quarters, and reduces them to the four sums with the first record and the four
-/// with the second.
+/// reason that kernel_variants.hpp gives: it holds two records, sums the minima in 64-bit lanes, of
+/// which four queries share the 16-bit quarters, and reduces them to the four sums with the first
+/// record and the four with the second.
 template <typename Pair>
-void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const std::uint8_t* pairs,
-                      std::size_t num_pairs, const std::uint16_t* least, Reached* reached) {
+void reaching_queries(const std::uint8_t* queries, const std::uint16_t* among,
+                      const std::uint8_t* const* records, std::size_t num_records,
+                      const std::uint16_t* least, Reached* reached) {
   constexpr int kQueriesAtOnce = 4;
-  for (std::size_t i = 0; i < num_pairs; ++i) {
-    const Pair pair = Pair::load(pairs + i * 2 * kBlockCounts);
+  constexpr std::size_t kRecordsAhead = 10;  // lie anywhere, and take some 20 ns each
+  for (std::size_t i = 0; i < num_records; i += 2) {
+    const std::size_t second = i + 1 < num_records ? i + 1 : i;
+    for (std::size_t n = i + kRecordsAhead; n < num_records && n < i + kRecordsAhead + 2; ++n) {
+      __builtin_prefetch(records[n]);
+      __builtin_prefetch(records[n] + kPackedBytes / 2);
+    }
+    const Pair pair(records[i], records[second]);
     const __m128i need =
-        _mm_unpacklo_epi64(_mm_set1_epi16(static_cast<std::int16_t>(least[2 * i])),
-                           _mm_set1_epi16(static_cast<std::int16_t>(least[2 * i + 1])));
+        _mm_unpacklo_epi64(_mm_set1_epi16(static_cast<std::int16_t>(least[i])),
+                           _mm_set1_epi16(static_cast<std::int16_t>(least[second])));
     __m128i best = _mm_setzero_si128();
     __m128i found = _mm_setzero_si128();
-    for (std::uint32_t left = among; left != 0;) {
+    for (std::uint32_t left = among[i / 2]; left != 0;) {
       typename Pair::Lanes lanes{};
       std::uint64_t bits = 0;
       for (int n = 0; n < kQueriesAtOnce && left != 0; ++n, left &= left - 1) {
@@ -70,10 +81,10 @@ void reaching_queries(const std::uint8_t* queries, std::uint32_t among, const st
     best = _mm_max_epu16(best, _mm_srli_epi64(best, 16));
     found = _mm_or_si128(found, _mm_srli_epi64(found, 32));
     found = _mm_or_si128(found, _mm_srli_epi64(found, 16));
-    reached[2 * i] = {static_cast<std::uint16_t>(_mm_extract_epi16(best, 0)),
-                      static_cast<std::uint16_t>(_mm_extract_epi16(found, 0))};
-    reached[2 * i + 1] = {static_cast<std::uint16_t>(_mm_extract_epi16(best, 4)),
-                          static_cast<std::uint16_t>(_mm_extract_epi16(found, 4))};
+    reached[i] = {static_cast<std::uint16_t>(_mm_extract_epi16(best, 0)),
+                  static_cast<std::uint16_t>(_mm_extract_epi16(found, 0))};
+    reached[second] = {static_cast<std::uint16_t>(_mm_extract_epi16(best, 4)),
+                       static_cast<std::uint16_t>(_mm_extract_epi16(found, 4))};
   }
 }
 

@@ -32,10 +32,11 @@ PlaceId PlaceStore::add(const BinaryContent& content) {
   const Chunk& chunk = chunks_[place / kChunkPlaces];
   chunk.contents[place % kChunkPlaces] = content;
   const BlockCounts blocks = block_counts(content);
-  const auto set = static_cast<std::uint16_t>(loopbit::count(blocks));
+  const CoarseCounts coarse = coarse_counts(blocks);
+  const auto set = static_cast<std::uint16_t>(loopbit::count(coarse));
   chunk.bounds->counts[place % kChunkPlaces] = set;
   extend_stretches(place, {blocks, set});
-  extend_coarse_stretch(place, {coarse_counts(blocks), set});
+  extend_coarse_stretch(place, coarse);
   size_.store(id + 1, std::memory_order_release);
   return id;
 }
@@ -55,25 +56,23 @@ void PlaceStore::take_chunk(std::size_t number) {
   memory_.push_back(std::move(bounds));
 }
 
-void PlaceStore::extend_stretches(std::size_t place, const Growing<BlockCounts>& counts) {
-  Growing<BlockCounts> finer = counts;
-  for (std::size_t level = kFinestLevel; level > 0; --level) {
-    Growing<BlockCounts>& growing = growing_[level];
-    growing.include(finer);
+void PlaceStore::extend_stretches(std::size_t place, const Growing& counts) {
+  const Growing* finer = &counts;
+  for (std::size_t level = kStretchPlaces.size(); level-- > 0;) {
+    Growing& growing = growing_[level];
+    growing.include(*finer);
+    if (level < kFinestLevel) growing_[level + 1] = {};
     if ((place + 1) % kStretchPlaces[level] != 0) return;
     const Position at = position(level, place / kStretchPlaces[level]);
-    BlockPair& pair = at.bounds->maxima[(at.record - kFirstRecord[1]) / 2];
-    for (std::size_t first = 0; first < kBlockCounts; first += kPairedCounts) {
-      std::copy_n(growing.maxima.of.begin() + first, kPairedCounts,
-                  pair.of.begin() + 2 * first + at.record % 2 * kPairedCounts);
-    }
+    at.bounds->maxima[at.record] = packed(growing.maxima);
     at.bounds->smallest_counts[at.record] = growing.smallest_count;
-    finer = std::exchange(growing, {});
+    finer = &growing;
   }
+  growing_[0] = {};
 }
 
-void PlaceStore::extend_coarse_stretch(std::size_t place, const Growing<CoarseCounts>& counts) {
-  growing_coarse_.include(counts);
+void PlaceStore::extend_coarse_stretch(std::size_t place, const CoarseCounts& counts) {
+  raise(growing_coarse_, counts);
   if ((place + 1) % kStretchPlaces.front() != 0) return;
   const std::size_t stretch = place / kStretchPlaces.front();
   const Position at = position(0, stretch);
@@ -81,9 +80,8 @@ void PlaceStore::extend_coarse_stretch(std::size_t place, const Growing<CoarseCo
   for (std::size_t k = 0; k < kCoarseCounts; ++k) {
     const std::size_t first = k / kCountsAtOnce * kCountsAtOnce;
     group.of[first * kInterleaved + stretch % kInterleaved * kCountsAtOnce + k - first] =
-        growing_coarse_.maxima.of[k];
+        growing_coarse_.of[k];
   }
-  at.bounds->smallest_counts[at.record] = growing_coarse_.smallest_count;
   growing_coarse_ = {};
 }
 

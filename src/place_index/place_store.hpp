@@ -28,11 +28,6 @@ inline constexpr std::size_t kFinestLevel = kStretchPlaces.size() - 1;
 /// The coarsest stretches are bounded side by side, 16 at once.
 inline constexpr std::size_t kGroupPlaces = kInterleaved * kStretchPlaces.front();
 
-/// The largest block counts in each of two consecutive stretches, paired as kernels want them.
-struct BlockPair {
-  alignas(64) std::array<std::uint8_t, 2 * kBlockCounts> of;
-};
-
 /// The largest coarse counts in each of 16 consecutive stretches, interleaved.
 struct CoarseGroup {
   alignas(64) std::array<std::uint8_t, kInterleaved * kCoarseCounts> of;
@@ -71,12 +66,12 @@ class PlaceStore {
     const Position at = position(level, stretch);
     return &at.bounds->smallest_counts[at.record];
   }
-  /// Likewise the largest block counts, by pairs. `stretch` is even. Not for the coarsest level.
-  [[nodiscard]] const BlockPair* maxima(std::size_t level, std::size_t stretch) const {
+  /// Likewise the largest block counts.
+  [[nodiscard]] const PackedCounts* maxima(std::size_t level, std::size_t stretch) const {
     const Position at = position(level, stretch);
-    return &at.bounds->maxima[(at.record - kFirstRecord[1]) / 2];
+    return &at.bounds->maxima[at.record];
   }
-  /// Likewise for the coarsest level, by groups of 16 stretches.
+  /// Likewise the largest coarse counts, by groups of 16 stretches of the coarsest level.
   [[nodiscard]] const CoarseGroup* coarse_group(std::size_t group) const {
     return &chunks_[group / kChunkGroups].bounds->coarse[group % kChunkGroups];
   }
@@ -98,7 +93,7 @@ class PlaceStore {
 
   struct Bounds {
     std::array<CoarseGroup, kChunkGroups> coarse;
-    std::array<BlockPair, (kFirstRecord.back() - kFirstRecord[1]) / 2> maxima;
+    std::array<PackedCounts, kFirstRecord.back()> maxima;
     std::array<std::uint16_t, kFirstRecord.back()> smallest_counts;
     std::array<std::uint16_t, kChunkPlaces> counts;
   };
@@ -110,9 +105,8 @@ class PlaceStore {
     Bounds* bounds;
     std::size_t record;
   };
-  template <typename Counts>
   struct Growing {
-    Counts maxima;
+    BlockCounts maxima;
     std::uint16_t smallest_count = UINT16_MAX;
 
     void include(const Growing& other) {
@@ -127,14 +121,14 @@ class PlaceStore {
     return {chunks_[stretch >> bits].bounds, kFirstRecord[level] + in_chunk};
   }
   void take_chunk(std::size_t number);
-  void extend_stretches(std::size_t place, const Growing<BlockCounts>& counts);
-  void extend_coarse_stretch(std::size_t place, const Growing<CoarseCounts>& counts);
+  void extend_stretches(std::size_t place, const Growing& counts);
+  void extend_coarse_stretch(std::size_t place, const CoarseCounts& counts);
 
-  std::array<Growing<BlockCounts>, kStretchPlaces.size()> growing_;  ///< by level; the writer's
-  Growing<CoarseCounts> growing_coarse_;                             ///< the writer's, too
-  std::unique_ptr<ScratchFile> file_;                                ///< of the contents, if any
-  std::vector<MappedMemory> memory_;  ///< of all chunks; for the writer only
-  std::unique_ptr<Chunk[]> chunks_;   ///< room for all there can be; size_ tells how many are there
+  std::array<Growing, kStretchPlaces.size()> growing_;  ///< by level; the writer's
+  CoarseCounts growing_coarse_;                         ///< the writer's, too
+  std::unique_ptr<ScratchFile> file_;                   ///< of the contents, if any
+  std::vector<MappedMemory> memory_;                    ///< of all chunks; for the writer only
+  std::unique_ptr<Chunk[]> chunks_;  ///< room for all there can be; size_ tells how many are there
   std::atomic<PlaceId> size_ = 0;
 };
 

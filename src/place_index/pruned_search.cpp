@@ -15,18 +15,13 @@ namespace {
 constexpr std::size_t kMaxShiftGroups = 16;
 
 /// Groups of coarsest stretches that one call of a kernel bounds; they lie in one chunk.
-constexpr std::size_t kGroupRun = 16;
-/// Finer stretches that one call bounds at most.
-constexpr std::size_t kRun = 16;
+constexpr std::size_t kGroupRun = 128;
 
 /// So many groups of the largest sums go first, then kBatchGrowth times as many, and so on.
-constexpr std::size_t kFirstBatch = 8;
+constexpr std::size_t kFirstBatch = 16;
 constexpr std::size_t kBatchGrowth = 8;
-/// So many coarsest stretches are descended into together; where there are no more, fewer.
-constexpr std::size_t kSlice = 128;
-constexpr std::size_t kSliceOfFew = 4;
 
-/// Memory is asked for so many stretches ahead of its use.
+/// Contents are asked for so many stretches ahead of their use.
 constexpr std::size_t kAhead = 4;
 
 constexpr std::size_t kFinestPlaces = kStretchPlaces[kFinestLevel];
@@ -52,7 +47,6 @@ PrunedSearch::PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryCon
   prepare_shifts(query, options.shift_tolerance_columns);
   all_shifts_ = static_cast<std::uint16_t>((1U << group_counts_.size()) - 1);
   coarse_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_ * kInterleaved);
-  selected_ = std::make_unique_for_overwrite<std::uint32_t[]>(num_groups_ * kInterleaved);
   largest_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_);
 }
 
@@ -74,24 +68,24 @@ void PrunedSearch::prepare_shifts(const BinaryContent& query, int tolerance_colu
 
 std::vector<Candidate> PrunedSearch::run() {
   bound_coarse_stretches();
+  bound_tail();
   search_coarse_stretches();
-  search_tail();
   return std::move(found_).answer();
 }
 
-/// Searches the places behind the last whole group of coarsest stretches.
-void PrunedSearch::search_tail() {
-  std::size_t searched = num_groups_ * kGroupPlaces;
-  for (std::size_t level = 1; level <= kFinestLevel; ++level) {
-    const std::size_t last = end_ / kStretchPlaces[level] / 2 * 2;
-    std::vector<Stretch> stretches;
-    for (std::size_t first = searched / kStretchPlaces[level]; first < last; first += kRun) {
-      bound_run(level, first, std::min(first + kRun, last), all_shifts_, stretches);
+/// Bounds the stretches behind the last whole group of coarsest ones, and compares the places that
+/// are in none.
+void PrunedSearch::bound_tail() {
+  std::size_t done = num_groups_ * kGroupPlaces;
+  for (std::size_t level = 0; level <= kFinestLevel; ++level) {
+    const std::size_t end = end_ / kStretchPlaces[level];
+    for (std::size_t number = done / kStretchPlaces[level]; number < end; ++number) {
+      add_to_run(level, number, 1, all_shifts_);
     }
-    descend(level, stretches);
-    searched = last * kStretchPlaces[level];
+    bound_run(level);
+    done = end * kStretchPlaces[level];
   }
-  for (; searched < end_; ++searched) compare_place(searched);
+  for (; done < end_; ++done) compare_place(done);
 }
 
 void PrunedSearch::bound_coarse_stretches() {
@@ -102,12 +96,11 @@ void PrunedSearch::bound_coarse_stretches() {
                                  store_.coarse_group(first)->of.data(), groups,
                                  &coarse_sums_[first * kInterleaved], &largest_sums_[first]);
   }
-  work_.stretches[0] = static_cast<std::int64_t>(num_groups_ * kInterleaved);
+  work_.coarse_stretches = static_cast<std::int64_t>(num_groups_ * kInterleaved);
 }
 
-/// Searches the coarsest stretches, those of large sums first, so that the floor soon rises above
-/// the bounds of the rest. Batches by sum, each in the order of places, take less time than sorting
-/// all.
+/// Searches all stretches, the coarsest in batches, those of large coarse sums first, so that the
+/// floor soon rises above the bounds of the rest.
 void PrunedSearch::search_coarse_stretches() {
   constexpr std::size_t kMaxSum = std::size_t{kContentSide} * kContentSide;
   constexpr std::size_t kSumsPerBucket = 4;
@@ -117,97 +110,103 @@ void PrunedSearch::search_coarse_stretches() {
   std::size_t wanted = kFirstBatch;
   for (std::size_t end = sizes.size(); end > 0; wanted *= kBatchGrowth) {
     const std::size_t upper_sum = end * kSumsPerBucket;
-    if (static_cast<int>(upper_sum) <= found_.least_overlap(query_count_)) return;
+    if (static_cast<int>(upper_sum) <= found_.least_overlap(query_count_)) break;
     for (std::size_t got = 0; end > 0 && got < wanted;) got += sizes[--end];
-    search_sums_between(end * kSumsPerBucket, upper_sum);
+    bound_sums_between(end * kSumsPerBucket, upper_sum);
+    search_waiting();
   }
+  search_waiting();
 }
 
-/// Searches the coarsest stretches whose sums are at least `lower` and below `upper`.
-void PrunedSearch::search_sums_between(std::size_t lower, std::size_t upper) {
+/// Bounds the coarsest stretches whose coarse sums are at least `lower` and below `upper`.
+void PrunedSearch::bound_sums_between(std::size_t lower, std::size_t upper) {
   const auto least = static_cast<std::size_t>(std::max(1, found_.least_overlap(query_count_)));
-  const std::size_t selected =
-      kernels_.select_sums(coarse_sums_.get(), num_groups_ * kInterleaved,
-                           static_cast<std::uint16_t>(std::max(lower, least)),
-                           static_cast<std::uint16_t>(upper), selected_.get());
-  std::vector<Stretch>& stretches = children_.front();
-  stretches.clear();
-  stretches.reserve(selected);
-  for (std::size_t i = 0; i < selected; ++i) {
-    const std::uint32_t number = selected_[i];
-    stretches.push_back({number, coarse_sums_[number],
-                         larger_count(*store_.smallest_counts(0, number)), all_shifts_});
+  std::array<std::uint32_t, kGroupRun * kInterleaved>
+      selected;  // NOLINT: written before it is read
+  for (std::size_t group = 0; group < num_groups_; group += kGroupRun) {
+    const std::size_t first = group * kInterleaved;
+    const std::size_t num_selected = kernels_.select_sums(
+        &coarse_sums_[first], &largest_sums_[group], std::min(kGroupRun, num_groups_ - group),
+        static_cast<std::uint16_t>(std::max(lower, least)), static_cast<std::uint16_t>(upper),
+        selected.data());
+    for (std::size_t i = 0; i < num_selected; ++i) {
+      const std::size_t number = first + selected[i];
+      const int larger = larger_count(*store_.smallest_counts(0, number));
+      if (coarse_sums_[number] < found_.least_overlap(larger)) continue;
+      add_to_run(0, number, 1, all_shifts_);
+    }
   }
-  // Few are worth sorting: the best of them raise the floor for the others.
-  const bool are_few = selected <= kSlice;
-  if (are_few) {
-    std::sort(stretches.begin(), stretches.end(),
-              [](const Stretch& a, const Stretch& b) { return a.sum > b.sum; });
-  }
-  const std::size_t slice = are_few ? kSliceOfFew : kSlice;
-  const std::span<const Stretch> all = stretches;
-  for (std::size_t first = 0; first < selected; first += slice) {
-    descend(0, all.subspan(first, std::min(slice, selected - first)));
+  bound_run(0);
+}
+
+/// Searches what waits, down to the places.
+void PrunedSearch::search_waiting() {
+  for (;;) {
+    const std::size_t level = waiting_.pop(found_.floor().similarity, taken_);
+    if (taken_.empty()) return;
+    if (level < kFinestLevel) {
+      bound_children(level);
+    } else {
+      compare_taken();
+    }
   }
 }
 
-/// Searches stretches down to their places.
-void PrunedSearch::descend(std::size_t level, std::span<const Stretch> stretches) {
-  if (level < kFinestLevel) {
-    std::vector<Stretch>& children = children_[level + 1];
-    children.clear();
-    bound_children(level, stretches, children);
-    descend(level + 1, children);
-    return;
+/// Bounds the stretches of the next level within those that were taken.
+void PrunedSearch::bound_children(std::size_t level) {
+  const std::size_t children = kStretchPlaces[level] / kStretchPlaces[level + 1];
+  for (const Stretch& stretch : taken_) {
+    if (!may_matter(level, stretch)) continue;
+    add_to_run(level + 1, stretch.number * children, children, stretch.shifts);
   }
-  for (std::size_t i = 0; i < stretches.size(); ++i) {
-    if (i + kAhead < stretches.size()) {
-      prefetch(&store_.content(stretches[i + kAhead].number * kFinestPlaces),
+  bound_run(level + 1);
+}
+
+/// Compares the contents of the stretches that were taken.
+void PrunedSearch::compare_taken() {
+  for (std::size_t i = 0; i < taken_.size(); ++i) {
+    if (i + kAhead < taken_.size()) {
+      prefetch(&store_.content(taken_[i + kAhead].number * kFinestPlaces),
                kFinestPlaces * sizeof(BinaryContent));
     }
-    if (may_matter(level, stretches[i])) compare_stretch(stretches[i]);
+    if (may_matter(kFinestLevel, taken_[i])) compare_stretch(taken_[i]);
   }
 }
 
-/// Appends to `kept` the stretches of the next level within `parents` that may matter.
-void PrunedSearch::bound_children(std::size_t level, std::span<const Stretch> parents,
-                                  std::vector<Stretch>& kept) {
-  const std::size_t children = kStretchPlaces[level] / kStretchPlaces[level + 1];
-  for (std::size_t i = 0; i < parents.size(); ++i) {
-    if (i + kAhead < parents.size()) {
-      const std::size_t first = parents[i + kAhead].number * children;
-      prefetch(store_.maxima(level + 1, first), children / 2 * sizeof(BlockPair));
-      prefetch(store_.smallest_counts(level + 1, first), 1);
-    }
-    if (!may_matter(level, parents[i])) continue;
-    const std::size_t first = parents[i].number * children;
-    bound_run(level + 1, first, first + children, parents[i].shifts, kept);
-  }
-}
-
-/// Bounds the stretches first to last - 1, at most kRun, of one chunk, at some of the shifts, and
-/// appends to `kept` those that may matter.
-void PrunedSearch::bound_run(std::size_t level, std::size_t first, std::size_t last,
-                             std::uint16_t shifts, std::vector<Stretch>& kept) {
-  const std::size_t run = last - first;
+/// Adds consecutive stretches, all of one chunk, to those that one call of a kernel bounds. A run
+/// is of one level, and each two of it have the same shifts.
+void PrunedSearch::add_to_run(std::size_t level, std::size_t first, std::size_t stretches,
+                              std::uint16_t shifts) {
+  if (run_.size + stretches > kRun) bound_run(level);
+  const PackedCounts* maxima = store_.maxima(level, first);
   const std::uint16_t* smallest = store_.smallest_counts(level, first);
-  std::array<std::uint16_t, kRun> least{};
-  std::array<Reached, kRun> reached;  // NOLINT: written to before it is read
-  for (std::size_t i = 0; i < run; ++i) {
-    const int needed = found_.least_overlap(larger_count(smallest[i]));
-    least[i] = static_cast<std::uint16_t>(std::max(1, needed));
+  for (std::size_t i = 0; i < stretches; ++i) {
+    const std::size_t at = run_.size++;
+    const std::uint16_t larger = larger_count(smallest[i]);
+    run_.numbers[at] = static_cast<std::uint32_t>(first + i);
+    run_.maxima[at] = maxima[i].of.data();
+    run_.larger_counts[at] = larger;
+    run_.least_sums[at] = static_cast<std::uint16_t>(std::max(1, found_.least_overlap(larger)));
+    run_.shifts[at / 2] = shifts;
   }
-  kernels_.reaching_queries(group_counts_.front().of.data(), shifts,
-                            store_.maxima(level, first)->of.data(), run / 2, least.data(),
-                            reached.data());
-  work_.stretches[level] += static_cast<std::int64_t>(run);
-  for (std::size_t i = 0; i < run; ++i) {
-    const auto [sum, reaching] = reached[i];
-    if (reaching == 0) continue;
-    const Stretch stretch{static_cast<std::uint32_t>(first + i), sum, larger_count(smallest[i]),
-                          reaching};
-    if (sum > least[i] || may_matter(level, stretch)) kept.push_back(stretch);
+}
+
+/// Bounds the stretches of the run, and lets those wait that may matter.
+void PrunedSearch::bound_run(std::size_t level) {
+  std::array<Reached, kRun> reached;  // NOLINT: written before it is read
+  kernels_.reaching_queries(group_counts_.front().of.data(), run_.shifts.data(), run_.maxima.data(),
+                            run_.size, run_.least_sums.data(), reached.data());
+  // Which ones are kept is hard to foresee: gathering them first takes no branch.
+  std::array<Stretch, kRun> kept;  // NOLINT: written before it is read
+  std::size_t num_kept = 0;
+  for (std::size_t i = 0; i < run_.size; ++i) {
+    kept[num_kept] = {run_.numbers[i], reached[i].largest_sum, run_.larger_counts[i],
+                      reached[i].queries};
+    num_kept += reached[i].queries != 0 ? 1U : 0U;
   }
+  for (std::size_t i = 0; i < num_kept; ++i) waiting_.push(level, kept[i]);
+  work_.stretches[level] += static_cast<std::int64_t>(run_.size);
+  run_.size = 0;
 }
 
 /// Compares the contents of a finest stretch with the query at the shifts that may matter.

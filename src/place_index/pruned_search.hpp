@@ -16,6 +16,7 @@
 #include "block_counts.hpp"
 #include "found_places.hpp"
 #include "place_store.hpp"
+#include "stretch_queue.hpp"
 
 namespace loopbit {
 
@@ -38,13 +39,17 @@ class PrunedSearch {
   [[nodiscard]] const RetrievalWork& work() const { return work_; }
 
  private:
-  /// A stretch whose places overlap the query by at most `sum`, at a max(|query|, |O|) of at least
-  /// `larger_count`.
-  struct Stretch {
-    std::uint32_t number;
-    std::uint16_t sum;
-    std::uint16_t larger_count;
-    std::uint16_t shifts;  ///< a bit for each group of shifts that may matter
+  /// Finer stretches that one call of a kernel bounds at most.
+  static constexpr std::size_t kRun = 128;
+
+  /// Stretches of one level that are bounded together.
+  struct Run {
+    std::array<const std::uint8_t*, kRun> maxima;
+    std::array<std::uint32_t, kRun> numbers;
+    std::array<std::uint16_t, kRun> larger_counts;
+    std::array<std::uint16_t, kRun> least_sums;  ///< that may matter
+    std::array<std::uint16_t, kRun / 2> shifts;  ///< of each two
+    std::size_t size = 0;
   };
 
   [[nodiscard]] bool may_matter(std::size_t level, const Stretch& stretch) const {
@@ -55,15 +60,16 @@ class PrunedSearch {
     return std::max(query_count_, count);
   }
   void prepare_shifts(const BinaryContent& query, int tolerance_columns);
-  void search_tail();
+  void bound_tail();
   void bound_coarse_stretches();
   void search_coarse_stretches();
-  void search_sums_between(std::size_t lower, std::size_t upper);
-  void descend(std::size_t level, std::span<const Stretch> stretches);
-  void bound_children(std::size_t level, std::span<const Stretch> parents,
-                      std::vector<Stretch>& kept);
-  void bound_run(std::size_t level, std::size_t first, std::size_t last, std::uint16_t shifts,
-                 std::vector<Stretch>& kept);
+  void bound_sums_between(std::size_t lower, std::size_t upper);
+  void search_waiting();
+  void bound_children(std::size_t level);
+  void compare_taken();
+  void add_to_run(std::size_t level, std::size_t first, std::size_t stretches,
+                  std::uint16_t shifts);
+  void bound_run(std::size_t level);
   void compare_stretch(const Stretch& stretch);
   void compare_place(std::size_t place);
   void consider(std::size_t place, int overlap);
@@ -82,10 +88,11 @@ class PrunedSearch {
   std::vector<BlockCounts> group_counts_;          ///< for each group of shifts, the maxima
   std::vector<CoarseCounts> coarse_counts_;        ///< likewise
   std::unique_ptr<std::uint16_t[]> coarse_sums_;   ///< for each coarsest stretch, the largest sum
-  std::unique_ptr<std::uint32_t[]> selected_;      ///< scratch, for coarsest stretches
   std::unique_ptr<std::uint16_t[]> largest_sums_;  ///< for each group of stretches
   FoundPlaces found_;
-  std::array<std::vector<Stretch>, kStretchPlaces.size()> children_;  ///< scratch, by level
+  StretchQueue waiting_;
+  std::vector<Stretch> taken_;  ///< from those that wait
+  Run run_;
   RetrievalWork work_;
 };
 

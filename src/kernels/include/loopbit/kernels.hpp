@@ -11,10 +11,11 @@ namespace loopbit {
 
 /// 64-bit words in one binary content.
 inline constexpr std::size_t kContentWords = 64;
-/// 8-bit counts in one record of block counts. Records come in pairs: the first 32 counts of the
-/// first, the first 32 of the second, then the next 32 of each, and so on.
-inline constexpr std::size_t kBlockCounts = 128;
-inline constexpr std::size_t kPairedCounts = 32;
+/// Block counts in [0, 16] in one record, which packs them in 4 bits, where 15 stands for 16: its
+/// byte 32 p + k has count 64 p + k in the lower bits, and count 64 p + 32 + k in the upper ones.
+inline constexpr std::size_t kBlockCounts = 256;
+inline constexpr std::size_t kPackedBytes = kBlockCounts / 2;
+inline constexpr std::size_t kPackedRun = 32;
 /// 8-bit counts in one record of coarse counts, and records that lie interleaved: the first four
 /// counts of each record, then the next four of each, and so on.
 inline constexpr std::size_t kCoarseCounts = 64;
@@ -80,28 +81,29 @@ struct Kernels {
                        const std::uint64_t* places, std::size_t num_places,
                        std::uint16_t* overlaps);
 
-  /// Which queries reach what a record needs; each query has its 128 counts in [0, 32] in order,
-  /// the records come in pairs. Of the queries q < 16 whose bit is set in `among`, bit q of
-  /// reached[i].queries is set where the sum over k of min(queries[q][k], records[i][k]) is at
-  /// least least[i]; reached[i].largest_sum is the largest of these sums.
-  /// Cost: for each of these queries and each pair, 256 bytes of minimum and sum.
-  void (*reaching_queries)(const std::uint8_t* queries, std::uint32_t among,
-                           const std::uint8_t* pairs, std::size_t num_pairs,
+  /// Which queries reach what a record needs; each query has its 256 block counts in bytes, in
+  /// order, each record packs them. Of the queries q < 16 whose bit is set in among[i / 2], bit q
+  /// of reached[i].queries is set where the sum over k of min(count k of q, count k of record i) is
+  /// at least least[i]; reached[i].largest_sum is the largest of these sums.
+  /// Cost: for each of these queries and each two records, 512 bytes of minimum and sum.
+  void (*reaching_queries)(const std::uint8_t* queries, const std::uint16_t* among,
+                           const std::uint8_t* const* records, std::size_t num_records,
                            const std::uint16_t* least, Reached* reached);
 
   /// The largest of such sums over all queries, of coarse counts in [0, 64]: each query has its 64
   /// in order, the records come in groups of 16 interleaved ones. sums[16 * g + i] belongs to
   /// record i of group g, and largest[g] is the largest of them.
-  /// Cost: num_queries * num_groups * 1 KB of minimum and sum.
+  /// Cost: num_queries * num_groups * 1 KB of minimum and sum, less where no query has a count.
   void (*largest_coarse_sums)(const std::uint8_t* queries, std::size_t num_queries,
                               const std::uint8_t* groups, std::size_t num_groups,
                               std::uint16_t* sums, std::uint16_t* largest);
 
   /// numbers[0], numbers[1], ... = those i, in order, for which sums[i] is at least `lower` and
-  /// below `upper`, both at most 32,767; returns how many there are. num_sums is a multiple of 16,
-  /// and `numbers` has room for all.
-  std::size_t (*select_sums)(const std::uint16_t* sums, std::size_t num_sums, std::uint16_t lower,
-                             std::uint16_t upper, std::uint32_t* numbers);
+  /// below `upper`, both at most 32,767; returns how many there are. The sums are those of groups
+  /// of 16, of which largest[g] is the largest of group g, and `numbers` has room for all.
+  std::size_t (*select_sums)(const std::uint16_t* sums, const std::uint16_t* largest,
+                             std::size_t num_groups, std::uint16_t lower, std::uint16_t upper,
+                             std::uint32_t* numbers);
 
   /// constants[i] = what this variant's nearest_two has to know of the i-th descriptor.
   void (*describe_constants)(const std::int8_t* descriptors, std::size_t num_descriptors,

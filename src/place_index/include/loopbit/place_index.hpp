@@ -55,7 +55,8 @@ struct RetrievalOptions {
 
 /// What one query looked at.
 struct RetrievalWork {
-  /// Stretches of 32, 16, 8 and 2 consecutive places whose bounds were computed.
+  std::int64_t coarse_stretches = 0;  ///< of 32 consecutive places, bounded coarsely
+  /// Stretches of 32, 16, 8 and 2 consecutive places whose finer bounds were computed.
   std::array<std::int64_t, 4> stretches{};
   std::int64_t contents = 0;  ///< places whose contents were compared
 };
@@ -65,13 +66,13 @@ class PlaceStore;
 /// The binary contents of all places, and the question which of them look like a query.
 ///
 /// One thread may add while any number of others ask: a query sees the places that were there when
-/// it began, and contents never move. Memory: 606 bytes a place, 512 of them its content.
+/// it began, and contents never move. Memory: 609 bytes a place, 512 of them its content.
 class PlaceIndex {
  public:
   /// All in memory.
   PlaceIndex();
   /// The contents in a file without a name in `scratch_folder`, mapped to memory, which holds what
-  /// the bounds need, 94 bytes a place. The file is gone when the index is. Throws Error (kind
+  /// the bounds need, 97 bytes a place. The file is gone when the index is. Throws Error (kind
   /// output) if it cannot be made.
   explicit PlaceIndex(const std::string& scratch_folder);
   ~PlaceIndex();
