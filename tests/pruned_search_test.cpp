@@ -177,9 +177,10 @@ TEST(PrunedSearch, OfEqualPlacesLooksAtFew) {
   const BinaryContent content = random_content(random, 0.3);
   PlaceStore store;
   add_all(store, Contents(5'000, content));
-  PrunedSearch search(store, store.size(), content, {}, active_kernels());
-  EXPECT_EQ(search.run().size(), 20U);
-  EXPECT_LT(search.work().contents, 500);
+  const RetrievalOptions options;
+  PrunedSearch search(store, store.size(), content, options, active_kernels());
+  EXPECT_EQ(search.run().size(), static_cast<std::size_t>(options.max_candidates));
+  EXPECT_LT(search.work().contents, 1'000);
 }
 
 Stretch stretch_of(std::size_t number, int sum, int larger_count) {
