@@ -282,7 +282,8 @@ void measure_hard_maps(const LongSequence& map, const LongSequence& elsewhere) {
   print_hard("random_bits", noise, queries);
 }
 
-/// The same places and queries in IndexBinaryFlat: Hamming distance, no shifts, 20 nearest.
+/// The same places and queries in IndexBinaryFlat: Hamming distance, no shifts, as many nearest as
+/// there are candidates.
 void run_faiss(LongSequence& map, const LongSequence& elsewhere, std::vector<Row>& rows) {
   faiss::IndexBinaryFlat index(8 * sizeof(BinaryContent));
   index.xb.reserve(rows.back().places * sizeof(BinaryContent));
@@ -296,10 +297,11 @@ void run_faiss(LongSequence& map, const LongSequence& elsewhere, std::vector<Row
     std::vector<double> times;
     for (std::size_t i = 0; i < 2 * kScans; ++i) {
       const BinaryContent& query = i % 2 == 0 ? queries.revisits[i] : queries.new_places[i];
-      std::vector<std::int32_t> distances(20);
-      std::vector<faiss::IndexBinary::idx_t> places(20);
+      constexpr int kNearest = RetrievalOptions{}.max_candidates;
+      std::vector<std::int32_t> distances(kNearest);
+      std::vector<faiss::IndexBinary::idx_t> places(kNearest);
       const double start_ms = thread_ms();
-      index.search(1, reinterpret_cast<const std::uint8_t*>(query.rows.data()), 20,
+      index.search(1, reinterpret_cast<const std::uint8_t*>(query.rows.data()), kNearest,
                    distances.data(), places.data());
       times.push_back(thread_ms() - start_ms);
     }

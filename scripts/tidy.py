@@ -150,7 +150,9 @@ def main():
                                      todo))
         else:
             (build / "tidy_batches").mkdir(exist_ok=True)
-            found = pool.map(lambda batch: check_batch(batch, pending, build), batches(todo))
+            # Those of the command, which come last, take longest.
+            found = pool.map(lambda batch: check_batch(batch, pending, build),
+                             reversed(list(batches(todo))))
             findings = [finding for of_batch in found for finding in of_batch]
     print("".join(findings), end="")
     failed = sum(map(bool, findings))

@@ -74,9 +74,9 @@ void print_table(const std::string& image, Status status, const std::vector<Show
 }
 
 /// One line an image, so that a program can read them as they come.
-void print_json(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
-  using Json = nlohmann::ordered_json;
-  Json json{{"image", image}, {"status", to_string(status)}, {"places", Json::array()}};
+void print_line(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
+  nlohmann::ordered_json json{
+      {"image", image}, {"status", to_string(status)}, {"places", nlohmann::ordered_json::array()}};
   for (const auto& [place, file] : places) {
     json["places"].push_back({{"session", place.place.session},
                               {"frame", place.place.frame},
@@ -86,7 +86,7 @@ void print_json(const std::string& image, Status status, const std::vector<Shown
                               {"inliers", place.inliers}});
     if (!file.empty()) json["places"].back()["image"] = file;
   }
-  fmt::print("{}\n", json.dump(-1, ' ', false, Json::error_handler_t::replace));
+  fmt::print("{}\n", json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
 /// Asks a map about images, and prints its answers.
@@ -131,7 +131,7 @@ class Relocalizer {
     for (const RankedPlace& place : places) {
       shown.push_back({place, place_images_ ? place_images_->file_of(place.place) : ""});
     }
-    (flags_.json ? print_json : print_table)(frame.name, status, shown);
+    (flags_.json ? print_line : print_table)(frame.name, status, shown);
   }
 
   const QueryFlags& flags_;
