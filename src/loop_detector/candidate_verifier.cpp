@@ -13,8 +13,8 @@ namespace {
 constexpr int kMinSightingInliers = 8;
 /// Fewer matches of what a promising candidate has are chance, and hardly change its distinctness.
 constexpr int kMinSharedMatches = 4;
-/// The same in the first look, which meets about half of them.
-constexpr int kMinSharedAtFirst = 2;
+/// The same in the first look, which meets a part of them.
+constexpr int kMinSharedAtFirst = 1;
 /// Of the places beside a candidate, so many are looked at closer.
 constexpr std::size_t kMaxBeside = 4;
 
