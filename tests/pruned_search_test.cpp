@@ -177,10 +177,9 @@ TEST(PrunedSearch, OfEqualPlacesLooksAtFew) {
   const BinaryContent content = random_content(random, 0.3);
   PlaceStore store;
   add_all(store, Contents(5'000, content));
-  const RetrievalOptions options;
-  PrunedSearch search(store, store.size(), content, options, active_kernels());
-  EXPECT_EQ(search.run().size(), static_cast<std::size_t>(options.max_candidates));
-  EXPECT_LT(search.work().contents, 1'000);
+  PrunedSearch search(store, store.size(), content, {.max_candidates = 20}, active_kernels());
+  EXPECT_EQ(search.run().size(), 20U);
+  EXPECT_LT(search.work().contents, 500);
 }
 
 Stretch stretch_of(std::size_t number, int sum, int larger_count) {
