@@ -226,7 +226,7 @@ void EpipolarRansac::mark(const cv::Matx33d& model) {
 
 /// The matrix that fits all inliers best, by the eight-point algorithm. What minimizes the sum of
 /// squares is the eigenvector of the smallest eigenvalue; inverse iteration finds it from the best
-/// model so far in a tenth of the time that all eigenvectors would take.
+/// model so far, without the other eight.
 cv::Matx33d EpipolarRansac::fit() const {
   using Vector = cv::Matx<double, 9, 1>;
   cv::Matx<double, 9, 9> squares = cv::Matx<double, 9, 9>::zeros();
