@@ -66,7 +66,7 @@ void print_row(const std::string& image, std::string_view status, const ShownPla
              shown.image.empty() ? "" : "  ", shown.image);
 }
 
-void print_table(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
+void print_rows(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
   if (places.empty()) fmt::print("{:<24}  {}\n", image, to_string(status));
   for (std::size_t i = 0; i < places.size(); ++i) {
     print_row(i == 0 ? image : "", i == 0 ? to_string(status) : "", places[i]);
@@ -131,7 +131,7 @@ class Relocalizer {
     for (const RankedPlace& place : places) {
       shown.push_back({place, place_images_ ? place_images_->file_of(place.place) : ""});
     }
-    (flags_.json ? print_line : print_table)(frame.name, status, shown);
+    (flags_.json ? print_line : print_rows)(frame.name, status, shown);
   }
 
   const QueryFlags& flags_;

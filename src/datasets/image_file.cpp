@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{512} << 20U;
+constexpr std::uintmax_t kMaxImageBytes = std::uintmax_t{512} << 20U;
 
 constexpr std::array<std::string_view, 10> kExtensions = {
     ".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".ppm", ".pnm", ".tif", ".tiff", ".webp"};
@@ -49,9 +49,9 @@ std::size_t checked_size(const fs::path& file) {
   const std::uintmax_t size = fs::file_size(file, error);
   if (error) fail(image_thing(file), fmt::format("has no readable size: {}", error.message()));
   if (size == 0) fail(image_thing(file), "is empty (0 bytes): copy it again");
-  if (size > kMaxFileBytes) {
+  if (size > kMaxImageBytes) {
     fail(image_thing(file),
-         fmt::format("has {} bytes, but at most {} are read: scale it down", size, kMaxFileBytes));
+         fmt::format("has {} bytes, but at most {} are read: scale it down", size, kMaxImageBytes));
   }
   return static_cast<std::size_t>(size);
 }

@@ -35,12 +35,12 @@ struct FreeVariable {
 using MatFile = std::unique_ptr<mat_t, CloseFile>;
 using Variable = std::unique_ptr<matvar_t, FreeVariable>;
 
-[[noreturn]] void fail(const std::string& path, const std::string& what) {
+[[noreturn]] void fail_file(const std::string& path, const std::string& what) {
   throw Error(ErrorKind::input, fmt::format("MATLAB file '{}' {}.", path, what));
 }
 
 [[noreturn]] void fail_damaged(const std::string& path, const std::string& name) {
-  fail(path, fmt::format("has a damaged variable '{}': copy it again, or save it anew", name));
+  fail_file(path, fmt::format("has a damaged variable '{}': copy it again, or save it anew", name));
 }
 
 /// What libmatio says of a file it would also say on stderr, which is the program's.
@@ -73,7 +73,7 @@ bool is_candidate(const matvar_t& variable) { return is_numeric(variable) && is_
 
 MatFile open(const std::string& path) {
   MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
-  if (!file) fail(path, "cannot be read: copy it again, or save it anew with the option -v7");
+  if (!file) fail_file(path, "cannot be read: copy it again, or save it anew with the option -v7");
   return file;
 }
 
@@ -91,20 +91,22 @@ Variable find(mat_t* file, const std::string& path, const std::string& wanted) {
   }
   if (candidates.size() == 1) return found;
   if (found) {
-    fail(path, fmt::format("has several square matrices: name the variable, one of {}",
-                           fmt::join(candidates, ", ")));
+    fail_file(path, fmt::format("has several square matrices: name the variable, one of {}",
+                                fmt::join(candidates, ", ")));
   }
-  fail(path, fmt::format("holds no {}, but {}: name a square matrix of numbers",
-                         wanted.empty() ? "square matrix" : fmt::format("variable '{}'", wanted),
-                         all.empty() ? "nothing" : fmt::format("{}", fmt::join(all, ", "))));
+  fail_file(path,
+            fmt::format("holds no {}, but {}: name a square matrix of numbers",
+                        wanted.empty() ? "square matrix" : fmt::format("variable '{}'", wanted),
+                        all.empty() ? "nothing" : fmt::format("{}", fmt::join(all, ", "))));
 }
 
 TruthMatrix::Shape checked_shape(const matvar_t& variable, const std::string& path) {
   const std::string name = name_of(variable);
   if (!is_numeric(variable) || variable.isComplex != 0 || variable.rank != 2) {
-    fail(path, fmt::format("has a variable '{}' that is no matrix of real numbers: name another, "
-                           "or save a logical or numeric matrix",
-                           name));
+    fail_file(path,
+              fmt::format("has a variable '{}' that is no matrix of real numbers: name another, "
+                          "or save a logical or numeric matrix",
+                          name));
   }
   if (variable.dims == nullptr) fail_damaged(path, name);
   return {variable.dims[0], variable.dims[1]};
@@ -211,15 +213,15 @@ void check_bytes(const matvar_t& variable, const std::string& path) {
   const std::size_t bytes =
       variable.dims[0] * variable.dims[1] * Mat_SizeOfClass(variable.class_type);
   if (bytes <= kMaxDenseBytes) return;
-  fail(path, fmt::format("has a matrix '{}' of {} bytes, but at most {} are read: save it as "
-                         "logical or sparse",
-                         name_of(variable), bytes, kMaxDenseBytes));
+  fail_file(path, fmt::format("has a matrix '{}' of {} bytes, but at most {} are read: save it as "
+                              "logical or sparse",
+                              name_of(variable), bytes, kMaxDenseBytes));
 }
 
 }  // namespace
 
 TruthMatrix read_mat_file(const std::string& path, const std::string& variable, int views) {
-  if (const std::string fault = fault_of_mat_file(path); !fault.empty()) fail(path, fault);
+  if (const std::string fault = fault_of_mat_file(path); !fault.empty()) fail_file(path, fault);
   static std::mutex libmatio;  // which reports to a function that is everybody's
   const std::scoped_lock lock(libmatio);
   Mat_LogInitFunc("loopbit", note_complaint);

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30U;
+constexpr std::uintmax_t kMaxTextBytes = std::uintmax_t{1} << 30U;
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
 /// Fit for a one-line message: control characters are replaced, and a UTF-8 character is not cut.
@@ -41,10 +41,10 @@ std::string excerpt(std::string_view text) {
 
 std::vector<TextRow> read_rows(const fs::path& file) {
   std::error_code error;
-  if (const auto bytes = fs::file_size(file, error); !error && bytes > kMaxFileBytes) {
+  if (const auto bytes = fs::file_size(file, error); !error && bytes > kMaxTextBytes) {
     throw Error(ErrorKind::input,
                 fmt::format("'{}' has {} bytes, but at most {} of text are read: split it.",
-                            file.string(), bytes, kMaxFileBytes));
+                            file.string(), bytes, kMaxTextBytes));
   }
   errno = 0;
   std::ifstream stream(file, std::ios::binary);

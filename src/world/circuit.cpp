@@ -97,7 +97,9 @@ std::vector<GridPoint> walk_around(const Tree& tree, int cells) {
   return corners;
 }
 
-double wrap(double value, double length) { return value - length * std::floor(value / length); }
+double wrap_m(double along_m, double length_m) {
+  return along_m - length_m * std::floor(along_m / length_m);
+}
 
 }  // namespace
 
@@ -165,7 +167,7 @@ int Circuit::piece_at(double along_m) const {
 }
 
 StreetPoint Circuit::at(double along_m, double left_m) const {
-  const double along = wrap(along_m, length_m_);
+  const double along = wrap_m(along_m, length_m_);
   const int piece = piece_at(along);
   const int turn = turn_at(piece);
   double rest = along - piece_start_m_[static_cast<std::size_t>(piece)];
@@ -189,12 +191,12 @@ StreetPoint Circuit::at(double along_m, double left_m) const {
 
 bool Circuit::blank_at(double along_m) const {
   if (blank_centre_m_.empty()) return false;
-  const double along = wrap(along_m, length_m_);
+  const double along = wrap_m(along_m, length_m_);
   const auto after = std::lower_bound(blank_centre_m_.begin(), blank_centre_m_.end(), along);
   const double next = after == blank_centre_m_.end() ? blank_centre_m_.front() : *after;
   const double last = after == blank_centre_m_.begin() ? blank_centre_m_.back() : *(after - 1);
   const auto apart = [&](double centre) {
-    return std::min(wrap(centre - along, length_m_), wrap(along - centre, length_m_));
+    return std::min(wrap_m(centre - along, length_m_), wrap_m(along - centre, length_m_));
   };
   return std::min(apart(next), apart(last)) <= blank_half_m_;
 }
