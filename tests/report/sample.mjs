@@ -239,6 +239,14 @@ function recordOf(columns, times, frames) {
   };
 }
 
+/** Contents and matrices by the number of frames, which is all that they depend on. */
+const madeContents = new Map();
+const madeMatrices = new Map();
+const madeOnce = (made, frames, make) => {
+  if (!made.has(frames)) made.set(frames, make());
+  return made.get(frames);
+};
+
 /** By contents for few frames, by distance along the street for many. */
 function matrixOf(places, contents) {
   const frames_per_cell = Math.max(1, Math.ceil(places.length / kMaxSide));
@@ -289,11 +297,10 @@ function runOf(places, index, options) {
   const verdict = verdictsOf(columns, truth);
   const times_ms = isExternal ? null : timesOf(frames, 1 + 0.4 * index, next);
   const hasContents = options.pictures && !isExternal;
-  const contents = hasContents && frames <= 400 ? places.map(contentAt) : null;
-  const similarityOf = (match, frame) => {
-    if (match < 0) return 0;
-    return similarity(contentAt(places[frame]), contentAt(places[match]), kTolerance);
-  };
+  const contents = madeOnce(madeContents, frames, () => places.map(contentAt));
+  const matrix = () => matrixOf(places, frames <= 400 ? contents : null);
+  const similarityOf = (match, frame) =>
+    match < 0 ? 0 : similarity(contents[frame], contents[match], kTolerance);
   const positions = places.map(positionAt);
   return {
     name: isExternal
@@ -319,7 +326,7 @@ function runOf(places, index, options) {
     positions: options.poses
       ? { x_m: positions.map(({ x }) => round(x, 4)), y_m: positions.map(({ y }) => round(y, 4)) }
       : null,
-    similarity_matrix: hasContents ? matrixOf(places, contents) : null,
+    similarity_matrix: hasContents ? madeOnce(madeMatrices, frames, matrix) : null,
     pictures: hasContents
       ? picturesOf(places, columns, truth, (1e6 * options.picturesMb) / options.runs)
       : {},
