@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: MIT
 // The Hessian against dlib's, and the parts of SURF against their definitions.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdlib>
+#include <numeric>
 #include <vector>
 
 #include <dlib/image_keypoint/hessian_pyramid.h>
@@ -18,6 +21,37 @@ namespace loopbit::test {
 namespace {
 
 class EveryKernel : public testing::TestWithParam<const Kernels*> {};
+
+TEST_P(EveryKernel, LinearRowsLieBetweenFourPixels) {
+  Random random(3);
+  for (const int width : {1, 2, 17, 300}) {
+    const cv::Mat1b rows = textured_image({width, 2}, 4);
+    constexpr std::size_t kCount = 100;
+    std::array<std::int32_t, kCount> columns{};
+    std::array<std::int32_t, kCount> right_weights{};
+    for (std::size_t i = 0; i < kCount; ++i) {
+      columns.at(i) = random.between(0, width - 1);
+      right_weights.at(i) = random.between(0, 256);
+    }
+    for (const std::int32_t lower_weight : {0, 1, 77, 256}) {
+      const LinearRow from{rows[0],        rows[1],
+                           lower_weight,   static_cast<std::uint32_t>(width),
+                           columns.data(), right_weights.data()};
+      std::vector<std::uint16_t> blended(static_cast<std::size_t>(width) + 1);
+      std::vector<std::uint32_t> pairs(blended.size());
+      std::array<std::uint8_t, kCount> pixels{};
+      GetParam()->linear_row(from, kCount, blended.data(), pairs.data(), pixels.data());
+      for (std::size_t i = 0; i < kCount; ++i) {
+        const int next = std::min(columns.at(i) + 1, width - 1);
+        const double down = lower_weight / 256.0;
+        const double right = right_weights.at(i) / 256.0;
+        const auto between = [&](int x) { return rows(0, x) * (1 - down) + rows(1, x) * down; };
+        const double expected = between(columns.at(i)) * (1 - right) + between(next) * right;
+        EXPECT_NEAR(pixels.at(i), expected, 0.5) << width << ' ' << i;
+      }
+    }
+  }
+}
 
 TEST_P(EveryKernel, IntegralImageSumsBoxes) {
   for (const cv::Size size : {cv::Size(1, 1), cv::Size(2, 3), cv::Size(31, 17), cv::Size(32, 16),
@@ -142,6 +176,57 @@ TEST_P(EveryKernel, DescribesAFlatPatchByZeros) {
   descriptor.fill(5);
   GetParam()->describe(flat.data(), descriptor.data());
   EXPECT_EQ(descriptor, Descriptor{});
+}
+
+using Values = std::array<double, kDescriptorSize>;
+
+/// How much a sample counts in a bin along one axis.
+double bin_weight(int sample, int bin) {
+  constexpr std::array kAwayFromMiddle = {1.0, 4.0 / 5, 4.0 / 6, 4.0 / 7};
+  const int away = std::abs(sample - (5 * bin + 2));
+  return away > 3 ? 0.0 : kAwayFromMiddle.at(static_cast<std::size_t>(away));
+}
+
+/// Sample by sample, in doubles.
+Values slow_descriptor(const Patch& cells) {
+  Values values{};
+  const auto cell = [&](int y, int x) {
+    return double{cells[static_cast<std::size_t>(y) * kCellStride + static_cast<std::size_t>(x)]};
+  };
+  for (int k = 0; k < 20 * 20 * 16; ++k) {
+    const int y = k / 16 / 20;
+    const int x = k / 16 % 20;
+    const int bin_y = k % 16 / 4;
+    const int bin_x = k % 4;
+    const double weight = bin_weight(y, bin_y) * bin_weight(x, bin_x);
+    const double dx = cell(y, x + 1) + cell(y + 1, x + 1) - cell(y, x) - cell(y + 1, x);
+    const double dy = cell(y + 1, x) + cell(y + 1, x + 1) - cell(y, x) - cell(y, x + 1);
+    const std::array sums = {dx, dy, std::abs(dx), std::abs(dy)};
+    for (std::size_t kind = 0; kind < sums.size(); ++kind) {
+      const auto bin = (static_cast<std::size_t>(4 * bin_y) + kind) * 4;
+      values.at(bin + static_cast<std::size_t>(bin_x)) += weight * sums.at(kind);
+    }
+  }
+  const double length =
+      std::sqrt(std::inner_product(values.begin(), values.end(), values.begin(), 0.0));
+  for (double& value : values) value *= 254 / length;
+  return values;
+}
+
+TEST_P(EveryKernel, DescribesAsTheSlowWay) {
+  const cv::Mat1b gray = textured_image({300, 200}, 7);
+  IntegralImage integral;
+  integral.load(gray, *GetParam());
+  for (const float scale : {2.0F, 3.3F, 7.0F}) {
+    Patch patch{};
+    upright_patch(integral, {.x_px = 150, .y_px = 100, .scale = scale}, *GetParam(), patch);
+    Descriptor descriptor{};
+    GetParam()->describe(patch.data(), descriptor.data());
+    const Values expected = slow_descriptor(patch);
+    for (std::size_t i = 0; i < kDescriptorSize; ++i) {
+      EXPECT_NEAR(descriptor.at(i), std::clamp(expected.at(i), -127.0, 127.0), 0.51) << i;
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Surf, EveryKernel,

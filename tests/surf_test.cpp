@@ -229,6 +229,33 @@ TEST(Surf, KeypointsAreInPixelsOfTheWorkingImage) {
   }
 }
 
+/// How many of `keypoints` have one of `others` within `max_px`.
+double num_near(const std::vector<Keypoint>& keypoints, const std::vector<Keypoint>& others,
+                double max_px) {
+  const auto near =
+      std::count_if(keypoints.begin(), keypoints.end(), [&](const Keypoint& keypoint) {
+        return std::any_of(others.begin(), others.end(), [&](const Keypoint& other) {
+          return cv::norm(at(keypoint) - at(other)) <= max_px;
+        });
+      });
+  return static_cast<double>(near);
+}
+
+TEST(Surf, ScalesImagesAsOpenCVDoes) {
+  for (const cv::Size size : {cv::Size(512, 384), cv::Size(752, 480), cv::Size(1242, 375)}) {
+    const cv::Mat1b gray = textured_image(size, 3);
+    const Features scaled_here = extract_surf(gray);
+    cv::Mat1b scaled;
+    cv::resize(gray, scaled, scaled_here.working_size_px, 0, 0, cv::INTER_LINEAR_EXACT);
+    const Features expected =
+        extract_surf(scaled, {.working_area_px = static_cast<int>(scaled.total())});
+    ASSERT_EQ(expected.working_size_px, scaled_here.working_size_px);
+    EXPECT_GT(num_near(scaled_here.keypoints, expected.keypoints, 0.2),
+              0.9 * static_cast<double>(expected.keypoints.size()))
+        << size;
+  }
+}
+
 TEST(Surf, ImagesOfAllShapesAreScaledToTheSameArea) {
   EXPECT_EQ(extract_surf(textured_image({1242, 375}, 1)).working_size_px, cv::Size(1009, 305));
   EXPECT_EQ(extract_surf(textured_image({375, 1242}, 1)).working_size_px, cv::Size(305, 1009));
@@ -312,15 +339,8 @@ TEST(Surf, DimImageKeepsMostKeypoints) {
   gray.convertTo(dim, CV_8U, 1.0 / 4);
   const Features bright = extract_unscaled(gray);
   const Features faint = extract_unscaled(dim);
-  int kept = 0;
-  for (const Keypoint& keypoint : bright.keypoints) {
-    kept += std::any_of(
-                faint.keypoints.begin(), faint.keypoints.end(),
-                [&](const Keypoint& other) { return cv::norm(at(keypoint) - at(other)) <= 2.0; })
-                ? 1
-                : 0;
-  }
-  EXPECT_GT(kept, 0.7 * static_cast<double>(bright.keypoints.size()));
+  EXPECT_GT(num_near(bright.keypoints, faint.keypoints, 2.0),
+            0.7 * static_cast<double>(bright.keypoints.size()));
 }
 
 TEST(Surf, DescriptorsHaveUnitLengthTimesTheirScale) {

@@ -3,7 +3,9 @@
 #include "loopbit/verification.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <utility>
@@ -467,6 +469,30 @@ TEST(Verify, AFirstLookMatchesTheStrongestFeatures) {
     EXPECT_EQ(at(query, look.matches[i].query), at(of_query, expected[i].query));
     EXPECT_EQ(at(place, look.matches[i].place), at(of_place, expected[i].place));
   }
+}
+
+TEST(Verify, MatchesOfSomeFeaturesAreThoseOfAll) {
+  const Features query = extract_surf(view(2));
+  const Features place = extract_surf(view(2, {12, 5}));
+  const std::vector<Match> all = match_features(query, place, 0.8);
+  Verifier verifier;
+  Verification some;
+  const auto num = static_cast<int>(query.descriptors.size());
+  for (const int step : {1, 3, 50}) {
+    std::vector<int> asked;
+    for (int i = step / 2; i < num; i += step) asked.push_back(i);
+    std::vector<Match> expected;
+    std::copy_if(all.begin(), all.end(), std::back_inserter(expected), [&](const Match& match) {
+      return std::binary_search(asked.begin(), asked.end(), match.query);
+    });
+    ASSERT_FALSE(expected.empty());
+    verifier.match_some(query, asked, place, some);
+    EXPECT_EQ(some.matches, expected) << step;
+  }
+  verifier.match_some(query, {}, place, some);
+  EXPECT_TRUE(some.matches.empty());
+  verifier.match_some(query, std::array{0, num - 1}, {}, some);
+  EXPECT_TRUE(some.matches.empty());
 }
 
 TEST(Verify, AFirstLookAtFewFeaturesIsAWholeOne) {

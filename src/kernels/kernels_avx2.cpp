@@ -292,10 +292,11 @@ const Kernels kAvx2Kernels{"avx2",
                            select_sums,
                            describe_constants,
                            nearest_two,
+                           linear_row,
                            integral_row,
                            hessian_row,
                            maxima_row,
-                           cell_means,
+                           upright_cells,
                            describe};
 
 }  // namespace loopbit

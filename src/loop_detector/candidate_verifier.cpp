@@ -12,9 +12,9 @@ namespace {
 /// Different places share a few inliers by chance; with so many they share a thing.
 constexpr int kMinSightingInliers = 8;
 /// Fewer matches of what a promising candidate has are chance, and hardly change its distinctness.
-constexpr int kMinSharedMatches = 4;
+constexpr std::size_t kMinSharedMatches = 4;
 /// The same in the first look, which meets a part of them.
-constexpr int kMinSharedAtFirst = 1;
+constexpr std::size_t kMinSharedAtFirst = 1;
 /// Of the places beside a candidate, so many are looked at closer.
 constexpr std::size_t kMaxBeside = 4;
 
@@ -172,8 +172,10 @@ void CandidateVerifier::look_at_others(const Query& query, std::span<const std::
   for (const std::size_t i : order) {
     if (!is_elsewhere(verified[i])) continue;
     if (num_shared(verifications_[i].matches) < kMinSharedAtFirst) continue;
+    const Features& place = places_.features(verified[i].candidate.place);
+    verifier_.match_some(query.features, promising_features_, place, verification_);
+    if (verification_.matches.size() < kMinSharedMatches) continue;
     match(query, verified[i], verifications_[i]);
-    if (num_shared(verifications_[i].matches) < kMinSharedMatches) continue;
     find_geometry(query, verified[i], verifications_[i]);
     note_promising(verified[i], verifications_[i]);
   }
@@ -185,6 +187,10 @@ void CandidateVerifier::note_promising(const VerifiedCandidate& candidate,
   promising_.push_back(spot_of(candidate));
   for (const Match& inlier : result.inliers) {
     is_promising_[static_cast<std::size_t>(inlier.query)] = true;
+  }
+  promising_features_.clear();
+  for (std::size_t i = 0; i < is_promising_.size(); ++i) {
+    if (is_promising_[i]) promising_features_.push_back(static_cast<int>(i));
   }
 }
 
@@ -200,10 +206,11 @@ bool CandidateVerifier::is_elsewhere(const VerifiedCandidate& candidate) const {
 }
 
 /// Of `matches`, those whose feature of the query is an inlier of a promising candidate.
-std::ptrdiff_t CandidateVerifier::num_shared(const std::vector<Match>& matches) const {
-  return std::count_if(matches.begin(), matches.end(), [&](const Match& match) {
+std::size_t CandidateVerifier::num_shared(const std::vector<Match>& matches) const {
+  const auto shared = std::count_if(matches.begin(), matches.end(), [&](const Match& match) {
     return is_promising_[static_cast<std::size_t>(match.query)];
   });
+  return static_cast<std::size_t>(shared);
 }
 
 /// The candidates with enough inliers to show that their place has what the query has.

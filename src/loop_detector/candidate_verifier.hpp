@@ -68,7 +68,7 @@ class CandidateVerifier {
                       std::vector<VerifiedCandidate>& verified);
   void note_promising(const VerifiedCandidate& candidate, const Verification& result);
   [[nodiscard]] bool is_elsewhere(const VerifiedCandidate& candidate) const;
-  [[nodiscard]] std::ptrdiff_t num_shared(const std::vector<Match>& matches) const;
+  [[nodiscard]] std::size_t num_shared(const std::vector<Match>& matches) const;
   void note_sightings(const std::vector<VerifiedCandidate>& verified);
 
   const LoopDetectorOptions& options_;
@@ -81,6 +81,7 @@ class CandidateVerifier {
   Verification verification_;                ///< of one such place
   std::vector<Spot> promising_;              ///< where promising candidates stand
   std::vector<bool> is_promising_;           ///< by feature of the query: it is an inlier of one
+  std::vector<int> promising_features_;      ///< the same as a list
   std::vector<Sighting> sightings_;          ///< none if no candidate is promising
 };
 

@@ -20,7 +20,9 @@ class IntegralImage {
   void load(const cv::Mat1b& gray, const Kernels& kernels);
 
   [[nodiscard]] cv::Size size_px() const { return size_px_; }
-  [[nodiscard]] IntegralView view() const { return {corners_, stride_, stride_ / 2}; }
+  [[nodiscard]] IntegralView view() const {
+    return {corners_, stride_, stride_ / 2, size_px_.width, size_px_.height};
+  }
 
   /// 0 <= y <= height: the corners above pixel row y.
   [[nodiscard]] const std::uint32_t* row(int y) const { return corners_ + y * stride_; }

@@ -7,37 +7,11 @@
 #include <numbers>
 
 namespace loopbit {
-namespace {
-
-/// The 22 lines between cells along one axis, in pixel corners from 0 to `size`.
-std::array<int, kCells + 1> cell_edges(float center_px, float scale, int size) {
-  std::array<int, kCells + 1> edges;
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    // The middle of pixel 0 lies between corners 0 and 1; + 0.5 again rounds.
-    const float edge_px = center_px + (static_cast<float>(i) - 10.5F) * scale + 1.0F;
-    edges[i] = std::clamp(static_cast<int>(edge_px), 0, size);
-  }
-  return edges;
-}
-
-float inverse(int length) { return length > 0 ? 1.0F / static_cast<float>(length) : 0.0F; }
-
-}  // namespace
 
 void upright_patch(const IntegralImage& integral, const Keypoint& keypoint, const Kernels& kernels,
                    Patch& patch) {
-  const auto xs = cell_edges(keypoint.x_px, keypoint.scale, integral.size_px().width);
-  const auto ys = cell_edges(keypoint.y_px, keypoint.scale, integral.size_px().height);
-  CellGrid grid{};
-  for (std::size_t i = 0; i < kCells; ++i) {
-    grid.inverse_heights[i] = inverse(ys[i + 1] - ys[i]);
-    grid.inverse_widths[i] = inverse(xs[i + 1] - xs[i]);
-  }
-  for (std::size_t i = 0; i <= kCells; ++i) grid.rows[i] = integral.row(ys[i]);
-  for (std::size_t i = 0; i <= kCellStride; ++i) {
-    grid.columns[i] = static_cast<std::int32_t>(integral.column(xs[std::min(i, kCells)]));
-  }
-  kernels.cell_means(grid, patch.data());
+  kernels.upright_cells(integral.view(), keypoint.x_px, keypoint.y_px, keypoint.scale,
+                        patch.data());
 }
 
 void turned_patch(const IntegralImage& integral, const Keypoint& keypoint, Patch& patch) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <tuple>
 #include <vector>
 
@@ -18,13 +19,27 @@ namespace {
 
 /// In squared grey levels: below, the 8 bits of a pixel are too coarse to tell a blob.
 constexpr float kMinResponse = 1.0F;
-/// Down to this factor, linear interpolation takes every pixel into account; it is five times
-/// faster than averaging areas.
+/// Down to this factor, linear interpolation takes every pixel into account; it is much faster than
+/// averaging areas.
 constexpr double kLeastLinearFactor = 0.5;
 /// The grid's cells are about this wide and high, at least one.
 constexpr int kGridCellPx = 80;
 /// A cell may hold this many times its share of the budget.
 constexpr int kMaxShares = 3;
+
+/// Where the middle of a scaled pixel lies between the middles of two pixels, along one axis;
+/// within the image.
+struct Between {
+  Between(int scaled, int scaled_size, int size) {
+    const double at = (scaled + 0.5) * size / scaled_size - 0.5;
+    const double within = std::clamp(at, 0.0, size - 1.0);
+    first = static_cast<int>(within);
+    next_weight = static_cast<std::int32_t>((within - first) * 256 + 0.5);
+  }
+
+  int first = 0;
+  std::int32_t next_weight = 0;  ///< 0 to 256
+};
 
 struct Blob {
   Maximum maximum;
@@ -64,9 +79,37 @@ class SurfExtractor::Impl {
     const cv::Size size(std::max(1, cvRound(gray.cols * factor)),
                         std::max(1, cvRound(gray.rows * factor)));
     if (size == gray.size()) return gray;
-    const bool skips_pixels = factor < kLeastLinearFactor;
-    cv::resize(gray, working_, size, 0, 0, skips_pixels ? cv::INTER_AREA : cv::INTER_LINEAR_EXACT);
+    if (factor < kLeastLinearFactor) {
+      cv::resize(gray, working_, size, 0, 0, cv::INTER_AREA);
+    } else {
+      interpolate(gray, size);
+    }
     return working_;
+  }
+
+  /// Linearly, as OpenCV's INTER_LINEAR_EXACT and in half the time.
+  void interpolate(const cv::Mat1b& gray, cv::Size size) {
+    working_.create(size);
+    const auto width = static_cast<std::size_t>(size.width);
+    columns_.resize(width);
+    right_weights_.resize(width);
+    for (int x = 0; x < size.width; ++x) {
+      const Between at(x, size.width, gray.cols);
+      columns_[static_cast<std::size_t>(x)] = at.first;
+      right_weights_[static_cast<std::size_t>(x)] = at.next_weight;
+    }
+    blended_.resize(static_cast<std::size_t>(gray.cols) + 1);
+    pairs_.resize(blended_.size());
+    LinearRow from{.width = static_cast<std::uint32_t>(gray.cols),
+                   .columns = columns_.data(),
+                   .right_weights = right_weights_.data()};
+    for (int y = 0; y < size.height; ++y) {
+      const Between at(y, size.height, gray.rows);
+      from.upper = gray[at.first];
+      from.lower = gray[std::min(at.first + 1, gray.rows - 1)];
+      from.lower_weight = at.next_weight;
+      kernels_.linear_row(from, width, blended_.data(), pairs_.data(), working_[y]);
+    }
   }
 
   /// Keeps the strongest maxima of each cell of a grid.
@@ -152,6 +195,10 @@ class SurfExtractor::Impl {
   SurfOptions options_;
   const Kernels& kernels_;
   cv::Mat1b working_;
+  std::vector<std::int32_t> columns_;
+  std::vector<std::int32_t> right_weights_;
+  std::vector<std::uint16_t> blended_;
+  std::vector<std::uint32_t> pairs_;
   IntegralImage integral_;
   HessianPyramid pyramid_;
   std::vector<Maximum> maxima_;

@@ -11,7 +11,7 @@ namespace loopbit {
 namespace {
 
 constexpr std::size_t kSample = 7;
-constexpr int kMaxSamples = 1000;
+constexpr int kMaxSamples = 200;
 constexpr double kConfidence = 0.999;
 constexpr int kRefits = 6;
 

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <array>
+#include <iterator>
+#include <numeric>
 
 namespace loopbit {
 namespace {
@@ -36,22 +38,21 @@ void FeatureMatcher::find_constants(Descriptors descriptors) {
   kernels_.describe_constants(descriptors.front().data(), descriptors.size(), constants_.data());
 }
 
-void FeatureMatcher::find_one_way(Descriptors query, Descriptors place, double max_ratio) {
+void FeatureMatcher::find_one_way(Descriptors query, std::span<const int> asked, Descriptors place,
+                                  double max_ratio) {
   find_constants(place);
   NearestTwo nearest;
   Lanes lanes{};
-  for (std::size_t begin = 0; begin < query.size(); begin += kMatchLanes) {
-    const std::size_t count = std::min(kMatchLanes, query.size() - begin);
-    const Descriptor* descriptors = &query[begin];
-    if (count < kMatchLanes) {
-      std::copy_n(descriptors, count, lanes.begin());
-      descriptors = lanes.data();
+  for (std::size_t begin = 0; begin < asked.size(); begin += kMatchLanes) {
+    const std::size_t count = std::min(kMatchLanes, asked.size() - begin);
+    for (std::size_t lane = 0; lane < count; ++lane) {
+      lanes[lane] = query[static_cast<std::size_t>(asked[begin + lane])];
     }
-    kernels_.nearest_two(descriptors->data(), place.front().data(), constants_.data(), place.size(),
-                         nearest);
+    kernels_.nearest_two(lanes.front().data(), place.front().data(), constants_.data(),
+                         place.size(), nearest);
     for (std::size_t lane = 0; lane < count; ++lane) {
       if (!is_distinct(nearest, lane, max_ratio)) continue;
-      matches_.push_back({static_cast<int>(begin + lane), nearest.index[lane]});
+      matches_.push_back({asked[begin + lane], nearest.index[lane]});
     }
   }
 }
@@ -78,10 +79,11 @@ void FeatureMatcher::keep_mutual(Descriptors query, Descriptors place, double ma
   matches_.resize(kept);
 }
 
-void FeatureMatcher::match_group(Descriptors query, Descriptors place, double max_ratio) {
+void FeatureMatcher::match_group(Descriptors query, std::span<const int> asked, Descriptors place,
+                                 double max_ratio) {
   matches_.clear();
-  if (query.empty() || place.empty()) return;
-  find_one_way(query, place, max_ratio);
+  if (asked.empty() || place.empty()) return;
+  find_one_way(query, asked, place, max_ratio);
   keep_mutual(query, place, max_ratio);
 }
 
@@ -90,9 +92,34 @@ void FeatureMatcher::match(const Features& query, const Features& place, double 
   static_assert(sizeof(Descriptor) == kDescriptorSize);
   const Groups of_query = strongest_of(query, strongest);
   const Groups of_place = strongest_of(place, strongest);
-  match_group(of_query.dark, of_place.dark, max_ratio);
+  asked_.resize(std::max(of_query.dark.size(), of_query.bright.size()));
+  std::iota(asked_.begin(), asked_.end(), 0);
+  const std::span<const int> all = asked_;
+  match_group(of_query.dark, all.first(of_query.dark.size()), of_place.dark, max_ratio);
   matches = matches_;
-  match_group(of_query.bright, of_place.bright, max_ratio);
+  match_group(of_query.bright, all.first(of_query.bright.size()), of_place.bright, max_ratio);
+  append_bright(query, place, matches);
+}
+
+void FeatureMatcher::match_some(const Features& query, std::span<const int> asked,
+                                const Features& place, double max_ratio,
+                                std::vector<Match>& matches) {
+  const Groups of_query = strongest_of(query, query.descriptors.size());
+  const Groups of_place = strongest_of(place, place.descriptors.size());
+  const auto num_dark = static_cast<int>(query.num_dark);
+  const auto bright = std::lower_bound(asked.begin(), asked.end(), num_dark);
+  match_group(of_query.dark, {asked.begin(), bright}, of_place.dark, max_ratio);
+  matches = matches_;
+  asked_.clear();
+  std::transform(bright, asked.end(), std::back_inserter(asked_),
+                 [&](int index) { return index - num_dark; });
+  match_group(of_query.bright, asked_, of_place.bright, max_ratio);
+  append_bright(query, place, matches);
+}
+
+/// The matches of the bright group, which comes after the dark one in either image.
+void FeatureMatcher::append_bright(const Features& query, const Features& place,
+                                   std::vector<Match>& matches) const {
   for (const Match& match : matches_) {
     matches.push_back({match.query + static_cast<int>(query.num_dark),
                        match.place + static_cast<int>(place.num_dark)});

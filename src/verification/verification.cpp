@@ -140,6 +140,12 @@ class Verifier::Impl {
     clear_geometry(result);
   }
 
+  void match_some(const Features& query, std::span<const int> asked, const Features& place,
+                  Verification& result) {
+    matcher_.match_some(query, asked, place, options_.max_ratio, result.matches);
+    clear_geometry(result);
+  }
+
   void find_geometry(const Features& query, const Features& place, Verification& result) {
     clear_geometry(result);
     if (result.matches.size() < static_cast<std::size_t>(options_.min_matches)) return;
@@ -174,6 +180,11 @@ void Verifier::match(const Features& query, const Features& place, Verification&
 
 void Verifier::match_strongest(const Features& query, const Features& place, Verification& result) {
   impl_->match_strongest(query, place, result);
+}
+
+void Verifier::match_some(const Features& query, std::span<const int> asked, const Features& place,
+                          Verification& result) {
+  impl_->match_some(query, asked, place, result);
 }
 
 void Verifier::find_geometry(const Features& query, const Features& place, Verification& result) {

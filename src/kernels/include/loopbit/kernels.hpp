@@ -47,14 +47,19 @@ struct IntegralView {
   const std::uint32_t* corners = nullptr;
   std::ptrdiff_t stride = 0;
   std::ptrdiff_t half = 0;
+  std::int32_t width = 0;  ///< of the image, in pixels
+  std::int32_t height = 0;
 };
 
-/// Where the cells of one descriptor meet, for a grid parallel to the image.
-struct CellGrid {
-  const std::uint32_t* rows[kCells + 1];  ///< rows of the integral image
-  std::int32_t columns[kCellStride + 1];  ///< offsets in them; those after kCells + 1 repeat
-  float inverse_heights[kCells];          ///< of the cells, in pixels
-  float inverse_widths[kCellStride];
+/// A row to interpolate linearly, between two rows of `width` pixels and their columns; weights are
+/// 0 to 256.
+struct LinearRow {
+  const std::uint8_t* upper = nullptr;
+  const std::uint8_t* lower = nullptr;
+  std::int32_t lower_weight = 0;
+  std::uint32_t width = 0;
+  const std::int32_t* columns = nullptr;        ///< the one to the left of each new pixel
+  const std::int32_t* right_weights = nullptr;  ///< of the next one; after the last it is that one
 };
 
 /// Descriptors whose neighbours are sought at once.
@@ -114,6 +119,10 @@ struct Kernels {
   void (*nearest_two)(const std::int8_t* descriptors, const std::int8_t* others,
                       const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest);
 
+  /// `count` pixels of such a row, rounded. `blended` and `pairs` are room for from.width + 1
+  /// numbers.
+  void (*linear_row)(const LinearRow& from, std::size_t count, std::uint16_t* blended,
+                     std::uint32_t* pairs, std::uint8_t* pixels);
   /// The next row of an integral image. `column_sums`: of all rows before, brought up to date; the
   /// corners at the row's lower edge, width + 1 of them, go to `even` and `odd`, see IntegralView.
   void (*integral_row)(const std::uint8_t* pixels, std::size_t width, std::uint32_t* column_sums,
@@ -129,8 +138,11 @@ struct Kernels {
   /// before and after layers[i], and writes whole blocks of 16.
   void (*maxima_row)(const float* const* layers, std::ptrdiff_t stride, std::ptrdiff_t count,
                      float min_response, std::uint8_t* is_maximum);
-  /// The mean grey level of each cell: kCells rows of kCellStride, the rest padding.
-  void (*cell_means)(const CellGrid& grid, float* cells);
+  /// The mean grey levels of kCells x kCells cells around a point, one `scale` in px wide each;
+  /// their edges are rounded to pixels and cut off at the image's. Rows of kCellStride, the rest
+  /// padding.
+  void (*upright_cells)(const IntegralView& integral, float x_px, float y_px, float scale,
+                        float* cells);
   /// The SURF descriptor (Bay et al. 2008, section 4.2) of such cells: sums of dx, dy, |dx| and
   /// |dy| over 4 x 4 bins, of unit length, times kDescriptorScale, rounded and cut off at 127. Bin
   /// (x, y) of kind k is value (4 y + k) * 4 + x. All 0 for cells without contrast.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <tuple>
 #include <vector>
 
@@ -103,6 +104,11 @@ class Verifier {
 
   /// The same for the strongest `first_look_keypoints` features of each, in a fraction of the time.
   void match_strongest(const Features& query, const Features& place, Verification& result);
+
+  /// Of what match() finds, the matches of the query's features `asked` (indices, rising), in the
+  /// time of so many features.
+  void match_some(const Features& query, std::span<const int> asked, const Features& place,
+                  Verification& result);
 
   /// Sets the rest from `result.matches`; leaves it empty where they are fewer than min_matches.
   void find_geometry(const Features& query, const Features& place, Verification& result);
