@@ -9,6 +9,8 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "loopbit/kernels.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -16,51 +18,49 @@ namespace {
 /// rounding noise, not structure: it has no phase worth keeping.
 constexpr float kNoiseAmplitude = 1.0F;
 
-/// A pixel's shares in the cell of the map where it begins and in the next one, along one axis. In
-/// units of 1/64 px a pixel is 64 long, and a cell as long as the image has pixels.
-struct Shares {
-  Shares(int pixel, int pixels)
-      : cell(kContentSide * pixel / pixels),
-        here(std::min(kContentSide, (cell + 1) * pixels - kContentSide * pixel)),
-        next(kContentSide - here),
-        ends_cell(kContentSide * (pixel + 1) >= (cell + 1) * pixels) {}
+/// Of a row of numbers for pixels, cumulated, the sum up to any 64th of a pixel.
+class RowSum {
+ public:
+  explicit RowSum(std::size_t size) : up_to_(size + 1, 0) {}
 
-  int cell;
-  int here;
-  int next;
-  bool ends_cell;
+  void load(const std::vector<std::uint32_t>& row) {
+    for (std::size_t x = 0; x < row.size(); ++x) up_to_[x + 1] = up_to_[x] + row[x];
+  }
+
+  /// 64 times the sum of the first `end` / 64 numbers.
+  [[nodiscard]] std::uint64_t operator()(std::size_t end) const {
+    const std::size_t x = end / kContentSide;
+    const std::size_t part = end % kContentSide;
+    return kContentSide * up_to_[x] + (part == 0 ? 0 : part * (up_to_[x + 1] - up_to_[x]));
+  }
+
+ private:
+  std::vector<std::uint64_t> up_to_;
 };
 
-/// The products fit 16 bits, where vectors hold the most.
-void add_row(const std::uint8_t* row, int share, std::vector<std::uint32_t>& sums) {
-  for (std::size_t x = 0; x < sums.size(); ++x) {
-    sums[x] += static_cast<std::uint16_t>(share * row[x]);
-  }
-}
-
-/// Means over the cells of the map, in whole grey levels. Integers all the way: OpenCV's INTER_AREA
-/// takes most of the time of a content.
+/// Means over the 64 x 64 cells of the map, in whole grey levels. In units of 1/64 px a pixel is 64
+/// long, and a cell as long as the image has pixels: so all is whole numbers.
 cv::Mat1f shrink_to_map(const cv::Mat1b& gray) {
-  std::vector<Shares> columns;
-  columns.reserve(static_cast<std::size_t>(gray.cols));
-  for (int x = 0; x < gray.cols; ++x) columns.emplace_back(x, gray.cols);
+  const auto width = static_cast<std::size_t>(gray.cols);
   const double area = static_cast<double>(gray.cols) * gray.rows;
-  std::vector<std::uint32_t> sums(columns.size(), 0);
+  std::vector<std::uint32_t> sums(width, 0);  // of the pixels above each other in a row of cells
+  RowSum row_sum(width);
   cv::Mat1f map(kContentSide, kContentSide);
   for (int y = 0; y < gray.rows; ++y) {
-    const Shares rows(y, gray.rows);
-    add_row(gray[y], rows.here, sums);
-    if (!rows.ends_cell) continue;
-    std::uint64_t sum = 0;
-    for (std::size_t x = 0; x < columns.size(); ++x) {
-      sum += std::uint64_t{sums[x]} * static_cast<std::uint64_t>(columns[x].here);
-      if (!columns[x].ends_cell) continue;
+    const int cell_y = kContentSide * y / gray.rows;
+    const int left_of_cell = (cell_y + 1) * gray.rows - kContentSide * y;
+    const int share = std::min(kContentSide, left_of_cell);
+    active_kernels().add_pixels(gray[y], width, static_cast<std::uint16_t>(share), sums.data());
+    if (left_of_cell > kContentSide) continue;
+    row_sum.load(sums);
+    for (std::size_t cell_x = 0; cell_x < kContentSide; ++cell_x) {
+      const std::uint64_t sum = row_sum((cell_x + 1) * width) - row_sum(cell_x * width);
       const auto mean = static_cast<int>(static_cast<double>(sum) / area + 0.5);
-      map(rows.cell, columns[x].cell) = static_cast<float>(mean);
-      sum = std::uint64_t{sums[x]} * static_cast<std::uint64_t>(columns[x].next);
+      map(cell_y, static_cast<int>(cell_x)) = static_cast<float>(mean);
     }
     std::fill(sums.begin(), sums.end(), 0U);
-    add_row(gray[y], rows.next, sums);
+    const auto rest = static_cast<std::uint16_t>(kContentSide - share);
+    active_kernels().add_pixels(gray[y], width, rest, sums.data());
   }
   return map;
 }
@@ -141,13 +141,6 @@ cv::Mat2f residual_spectrum(const cv::Mat2f& spectrum, int radius) {
   return residual;
 }
 
-cv::Mat1f squared_magnitude(const cv::Mat2f& map) {
-  cv::Mat1f magnitude(map.size());
-  std::transform(map.begin(), map.end(), magnitude.begin(),
-                 [](const cv::Vec2f& f) { return f[0] * f[0] + f[1] * f[1]; });
-  return magnitude;
-}
-
 int overlap(const BinaryContent& a, const BinaryContent& b) {
   int set = 0;
   for (std::size_t y = 0; y < a.rows.size(); ++y) set += std::popcount(a.rows[y] & b.rows[y]);
@@ -200,11 +193,11 @@ cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& option
   validate(options, "binary_content");
   cv::Mat2f spectrum;
   cv::dft(resize_to_map(gray), spectrum, cv::DFT_COMPLEX_OUTPUT);
-  cv::Mat2f residual = residual_spectrum(spectrum, options.residual_radius_px);
-  cv::Mat2f map;
-  cv::dft(residual, map, cv::DFT_INVERSE | cv::DFT_SCALE);
-  return separable_filter(squared_magnitude(map), gaussian_kernel(options.blur_sigma_px),
-                          cv::BORDER_REFLECT_101);
+  const cv::Mat2f residual = residual_spectrum(spectrum, options.residual_radius_px);
+  cv::Mat1f map;
+  cv::dft(residual, map, cv::DFT_INVERSE | cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
+  cv::multiply(map, map, map);
+  return separable_filter(map, gaussian_kernel(options.blur_sigma_px), cv::BORDER_REFLECT_101);
 }
 
 BinaryContent binarize(const cv::Mat1f& saliency, double gamma) {

@@ -131,9 +131,12 @@ std::size_t select_sums(const std::uint16_t* sums, const std::uint16_t* largest,
 
 }  // namespace
 
-const Kernels kScalarKernels{
-    "scalar",           max_overlaps<overlap>, reaching_queries, largest_coarse_sums, select_sums,
-    describe_constants, nearest_two,           linear_row,       integral_row,        hessian_row,
-    maxima_row,         upright_cells,         describe};
+const Kernels kScalarKernels{"scalar",         max_overlaps<overlap>,
+                             reaching_queries, largest_coarse_sums,
+                             select_sums,      describe_constants,
+                             nearest_two,      add_pixels,
+                             linear_row,       integral_row,
+                             hessian_row,      maxima_row,
+                             upright_cells,    describe};
 
 }  // namespace loopbit

@@ -11,7 +11,7 @@ namespace loopbit {
 namespace {
 
 constexpr std::size_t kSample = 7;
-constexpr int kMaxSamples = 200;
+constexpr int kMaxSamples = 500;
 constexpr double kConfidence = 0.999;
 constexpr int kRefits = 6;
 
@@ -105,12 +105,14 @@ bool eliminate(std::array<Row, kSample>& rows) {
     }
     if (std::abs(rows[pivot][i]) < kMinPivot) return false;
     std::swap(rows[i], rows[pivot]);
+    // The pivot's row is 0 before column i. Taking that in, too, makes loops of one length.
     const double factor = 1 / rows[i][i];
-    for (std::size_t j = i; j < 9; ++j) rows[i][j] *= factor;
+    for (double& element : rows[i]) element *= factor;
+    const Row pivot_row = rows[i];
     for (std::size_t k = 0; k < kSample; ++k) {
       if (k == i) continue;
       const double part = rows[k][i];
-      for (std::size_t j = i; j < 9; ++j) rows[k][j] -= part * rows[i][j];
+      for (std::size_t j = 0; j < 9; ++j) rows[k][j] -= part * pivot_row[j];
     }
   }
   return true;

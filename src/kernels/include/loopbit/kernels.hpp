@@ -119,6 +119,9 @@ struct Kernels {
   void (*nearest_two)(const std::int8_t* descriptors, const std::int8_t* others,
                       const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest);
 
+  /// sums[x] += weight * pixels[x], for weights up to 257.
+  void (*add_pixels)(const std::uint8_t* pixels, std::size_t width, std::uint16_t weight,
+                     std::uint32_t* sums);
   /// `count` pixels of such a row, rounded. `blended` and `pairs` are room for from.width + 1
   /// numbers.
   void (*linear_row)(const LinearRow& from, std::size_t count, std::uint16_t* blended,
