@@ -55,7 +55,7 @@ cv::Mat1f shrink_to_map(const cv::Mat1b& gray) {
     row_sum.load(sums);
     for (std::size_t cell_x = 0; cell_x < kContentSide; ++cell_x) {
       const std::uint64_t sum = row_sum((cell_x + 1) * width) - row_sum(cell_x * width);
-      const auto mean = static_cast<int>(static_cast<double>(sum) / area + 0.5);
+      const auto mean = std::lround(static_cast<double>(sum) / area);
       map(cell_y, static_cast<int>(cell_x)) = static_cast<float>(mean);
     }
     std::fill(sums.begin(), sums.end(), 0U);
