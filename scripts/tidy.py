@@ -57,10 +57,10 @@ def fingerprint(entry, files, common):
     return digest.hexdigest()
 
 
-def check(source, stamp, shared, options):
+def check(source, stamp, build, options):
     """What clang-tidy found in a source, or nothing, which the stamp then remembers."""
     result = subprocess.run(
-        [TIDY, "--quiet", *options, source, "--", *shared], capture_output=True, text=True
+        [TIDY, "--quiet", *options, "-p", build, source], capture_output=True, text=True
     )
     if result.returncode == 0:
         stamp.touch()
@@ -68,23 +68,13 @@ def check(source, stamp, shared, options):
     return result.stdout or result.stderr or f"{source}: exit code {result.returncode}\n"
 
 
-def precompiled(command):
-    """The precompiled header of a command, or None."""
-    return next((part for part in command if part.endswith("/cmake_pch.hxx")), None)
-
-
 def flags(entry):
-    """What a source is compiled with, but its own name, that of its object, and a precompiled header,
-    which clang cannot read."""
+    """What a source is compiled with, but its own name and that of its object."""
     command = shlex.split(entry["command"])
     output = command[command.index("-o") + 1]
     first = next(i for i, part in enumerate(command) if part.startswith("-"))
-    kept = [part for part in command[first:]
-            if part not in ("-o", output, "-c", entry["file"], "-Winvalid-pch")]
-    if header := precompiled(kept):
-        at = kept.index(header)
-        del kept[at - 1:at + 1]
-    return tuple(kept)
+    return tuple(part for part in command[first:]
+                 if part not in ("-o", output, "-c", entry["file"]))
 
 
 def check_batch(batch, pending, build):
@@ -92,7 +82,7 @@ def check_batch(batch, pending, build):
     cannot be compiled together, by halves."""
     sources, shared = batch
     if len(sources) == 1:
-        return [check(sources[0], pending[sources[0]], shared, QUICK)]
+        return [check(sources[0], pending[sources[0]], build, QUICK)]
     text = "".join(f'#include "{source}"\n' for source in sources)
     together = build / "tidy_batches" / f"{hashlib.sha256(text.encode()).hexdigest()}.cpp"
     together.write_text(text)
@@ -145,10 +135,7 @@ def main():
         output = command[command.index("-o") + 1]
         if output not in files:
             sys.exit(f"tidy.py: {source} is not compiled yet; build {build} first.")
-        included = files[output]
-        if header := precompiled(command):
-            included = included + files[f"{pathlib.Path(header).relative_to(build)}.gch"]
-        stamp = stamps / fingerprint(entry, included, common)
+        stamp = stamps / fingerprint(entry, files[output], common)
         if stamp.exists():
             passed.add(stamp)
         else:
@@ -159,8 +146,8 @@ def main():
 
     with ThreadPoolExecutor(arguments.jobs) as pool:
         if arguments.all:
-            findings = list(pool.map(lambda source: check(source, pending[source], flags(todo[source]),
-                                                           options), todo))
+            findings = list(pool.map(lambda source: check(source, pending[source], build, options),
+                                     todo))
         else:
             (build / "tidy_batches").mkdir(exist_ok=True)
             # Those of the command, which come last, take longest.
