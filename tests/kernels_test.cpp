@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/core.hpp>
 
 #include "test_support.hpp"
 
@@ -186,6 +188,53 @@ void expect_largest_coarse_sums(const Kernels& kernels, const Counts& queries,
     of_group = std::max(of_group, sums[i]);
   }
   ASSERT_EQ(largest, expected_largest);
+}
+
+/// Coordinates in [-2, 2).
+float random_coordinate(Random& random) { return static_cast<float>(4 * random.uniform() - 2); }
+
+PairSamples random_samples(Random& random) {
+  PairSamples samples;
+  for (auto* points : {&samples.x0, &samples.y0, &samples.x1, &samples.y1}) {
+    for (auto& pair : *points) {
+      std::generate(std::begin(pair), std::end(pair), [&] { return random_coordinate(random); });
+    }
+  }
+  return samples;
+}
+
+cv::Matx33d matrix_at(const EpipolarPencils& pencils, std::size_t lane, double x) {
+  cv::Matx33d matrix;
+  for (std::size_t i = 0; i < 9; ++i) {
+    matrix.val[i] = pencils.f[i][lane] + x * pencils.g[i][lane];
+  }
+  return matrix;
+}
+
+/// Random pairs, of which whatever lies behind the last one is not to be looked at.
+struct RandomPairs {
+  RandomPairs(Random& random, std::size_t count) : coordinates(4 * (count + kPairBlock)) {
+    std::generate(coordinates.begin(), coordinates.end(),
+                  [&] { return random_coordinate(random); });
+    const float* first = coordinates.data();
+    const std::size_t stride = count + kPairBlock;
+    pairs = {first, first + stride, first + 2 * stride, first + 3 * stride, count};
+  }
+
+  std::vector<float> coordinates;
+  PointPairs pairs;
+};
+
+/// From the definition.
+double sampson_sq(const std::array<float, 9>& model, const PointPairs& pairs, std::size_t i) {
+  cv::Matx33d f;
+  std::copy(model.begin(), model.end(), std::begin(f.val));
+  const cv::Vec3d p(pairs.x0[i], pairs.y0[i], 1);
+  const cv::Vec3d q(pairs.x1[i], pairs.y1[i], 1);
+  const cv::Vec3d fp = f * p;
+  const cv::Vec3d fq = f.t() * q;
+  const double error = q.dot(fp);
+  return error * error / (fp[0] * fp[0] + fp[1] * fp[1] + fq[0] * fq[0] + fq[1] * fq[1]);
 }
 
 class EveryKernel : public testing::TestWithParam<const Kernels*> {};
@@ -414,6 +463,109 @@ TEST_P(EveryKernel, SelectsTheSumsWithinLimits) {
     EXPECT_EQ(numbers, expected) << lower << " to " << upper;
   }
   EXPECT_EQ(GetParam()->select_sums(nullptr, nullptr, 0, 1, 2, nullptr), 0U);
+}
+
+TEST_P(EveryKernel, SolvesSamplesOfSevenPairs) {
+  Random random;
+  for (int run = 0; run < 20; ++run) {
+    const PairSamples samples = random_samples(random);
+    EpipolarPencils pencils;
+    GetParam()->solve_samples(samples, pencils);
+    for (std::size_t lane = 0; lane < kSampleLanes; ++lane) {
+      ASSERT_EQ(pencils.is_determined[lane], 1);
+      for (const double x : {-1.5, 0.0, 0.3, 2.0}) {
+        const cv::Matx33d matrix = matrix_at(pencils, lane, x);
+        const double size = cv::norm(matrix);
+        for (std::size_t k = 0; k < kSamplePairs; ++k) {
+          const cv::Vec3d p(samples.x0[k][lane], samples.y0[k][lane], 1);
+          const cv::Vec3d q(samples.x1[k][lane], samples.y1[k][lane], 1);
+          ASSERT_NEAR(q.dot(matrix * p) / size, 0, 1e-6) << "pair " << k << " at " << x;
+        }
+        const auto& power = pencils.determinant;
+        const double determinant =
+            ((power[3][lane] * x + power[2][lane]) * x + power[1][lane]) * x + power[0][lane];
+        ASSERT_NEAR(determinant / (size * size * size),
+                    cv::determinant(matrix) / (size * size * size), 1e-9);
+      }
+    }
+  }
+}
+
+TEST_P(EveryKernel, PencilsEqualTheScalarOnes) {
+  Random random;
+  for (int run = 0; run < 100; ++run) {
+    const PairSamples samples = random_samples(random);
+    EpipolarPencils pencils;
+    EpipolarPencils expected;
+    GetParam()->solve_samples(samples, pencils);
+    scalar().solve_samples(samples, expected);
+    for (std::size_t lane = 0; lane < kSampleLanes; ++lane) {
+      for (std::size_t i = 0; i < 9; ++i) {
+        ASSERT_EQ(pencils.f[i][lane], expected.f[i][lane]);
+        ASSERT_EQ(pencils.g[i][lane], expected.g[i][lane]);
+      }
+      for (std::size_t i = 0; i < 4; ++i) {
+        ASSERT_EQ(pencils.determinant[i][lane], expected.determinant[i][lane]);
+      }
+    }
+  }
+}
+
+TEST_P(EveryKernel, TellsWhichSamplesDetermineNothing) {
+  Random random;
+  PairSamples samples = random_samples(random);
+  for (auto* points : {&samples.x0, &samples.y0, &samples.x1, &samples.y1}) {
+    for (auto& pair : *points) {
+      pair[2] = 0.5F;                                 // one pair, seven times
+      pair[5] = points == &samples.x0 ? 0 : pair[5];  // all on one line through the origin
+    }
+  }
+  EpipolarPencils pencils;
+  GetParam()->solve_samples(samples, pencils);
+  for (std::size_t lane = 0; lane < kSampleLanes; ++lane) {
+    EXPECT_EQ(pencils.is_determined[lane], lane == 2 || lane == 5 ? 0 : 1) << lane;
+  }
+}
+
+TEST_P(EveryKernel, ScoresPairsBySampsonsDistance) {
+  constexpr float kMaxErrorSq = 0.3F;
+  Random random;
+  for (const std::size_t count : {0U, 1U, 15U, 16U, 17U, 100U}) {
+    const RandomPairs random_pairs(random, count);
+    const PointPairs& pairs = random_pairs.pairs;
+    std::array<float, 9> model{};
+    std::generate(model.begin(), model.end(), [&] { return random_coordinate(random); });
+    std::vector<std::uint8_t> is_inlier(count + kPairBlock, 9);
+    const EpipolarScore score =
+        GetParam()->epipolar_score(model.data(), pairs, kMaxErrorSq, is_inlier.data());
+    double cost = 0;
+    int inliers = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double distance_sq = sampson_sq(model, pairs, i);
+      cost += std::min<double>(distance_sq, kMaxErrorSq);
+      inliers += distance_sq < kMaxErrorSq ? 1 : 0;
+      EXPECT_EQ(is_inlier[i], distance_sq < kMaxErrorSq ? 1 : 0) << i << " of " << count;
+    }
+    EXPECT_EQ(score.inliers, inliers) << count;
+    EXPECT_NEAR(score.cost, cost, 1e-4) << count;
+
+    std::vector<std::uint8_t> expected_inliers(is_inlier.size(), 9);
+    const EpipolarScore expected =
+        scalar().epipolar_score(model.data(), pairs, kMaxErrorSq, expected_inliers.data());
+    EXPECT_EQ(score.cost, expected.cost);
+    EXPECT_EQ(is_inlier, expected_inliers);
+  }
+}
+
+TEST_P(EveryKernel, WithoutGradientThereIsNoInlier) {
+  Random random;
+  const RandomPairs random_pairs(random, 3);
+  const std::array<float, 9> nothing{};
+  std::vector<std::uint8_t> is_inlier(kPairBlock, 9);
+  const EpipolarScore score =
+      GetParam()->epipolar_score(nothing.data(), random_pairs.pairs, 0.5F, is_inlier.data());
+  EXPECT_EQ(score.inliers, 0);
+  EXPECT_EQ(score.cost, 1.5F);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, EveryKernel,

@@ -3,6 +3,7 @@
 // Compiled with -mavx2: nothing here may run before the processor was asked.
 #include <immintrin.h>
 
+#include "epipolar_loops.inc"
 #include "kernel_variants.hpp"
 #include "min_sums_x86.hpp"
 #include "surf_loops.inc"
@@ -298,6 +299,8 @@ const Kernels kAvx2Kernels{"avx2",
                            hessian_row,
                            maxima_row,
                            upright_cells,
-                           describe};
+                           describe,
+                           solve_samples,
+                           epipolar_score};
 
 }  // namespace loopbit

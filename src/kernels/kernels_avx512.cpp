@@ -4,6 +4,7 @@
 // processor was asked.
 #include <immintrin.h>
 
+#include "epipolar_loops.inc"
 #include "kernel_variants.hpp"
 #include "min_sums_x86.hpp"
 #include "surf_loops.inc"
@@ -31,15 +32,37 @@ constexpr std::size_t kAtOnce = 4;  // chains of 8 that hide the latency of VPDP
 
 __m512i raised(__m512i bytes) { return _mm512_xor_si512(bytes, _mm512_set1_epi8(-128)); }
 
-/// |p|^2 + 2 * 128 * sum of p.
+/// Numbers of which the sum is |p|^2 + 2 * 128 * sum of p.
+__m512i constant_parts(const std::int8_t* descriptor) {
+  const __m512i p = _mm512_loadu_si512(descriptor);
+  // (p + 128) p + 128 p
+  return _mm512_dpbusd_epi32(_mm512_dpbusd_epi32(_mm512_setzero_si512(), raised(p), p),
+                             _mm512_set1_epi8(-128), p);
+}
+
+/// Of each two numbers, from `a` and `b` in turn.
+__m512i pair_sums(__m512i a, __m512i b) {
+  return _mm512_add_epi32(_mm512_unpacklo_epi32(a, b), _mm512_unpackhi_epi32(a, b));
+}
+
 void describe_constants(const std::int8_t* descriptors, std::size_t num_descriptors,
                         std::int32_t* constants) {
-  for (std::size_t i = 0; i < num_descriptors; ++i) {
-    const __m512i p = _mm512_loadu_si512(descriptors + i * kDescriptorSize);
-    // (p + 128) p + 128 p
-    const __m512i sums = _mm512_dpbusd_epi32(
-        _mm512_dpbusd_epi32(_mm512_setzero_si512(), raised(p), p), _mm512_set1_epi8(-128), p);
-    constants[i] = _mm512_reduce_add_epi32(sums);
+  std::size_t i = 0;
+  for (; i + 4 <= num_descriptors; i += 4) {
+    const std::int8_t* first = descriptors + i * kDescriptorSize;
+    const __m512i even = pair_sums(constant_parts(first), constant_parts(first + kDescriptorSize));
+    const __m512i odd = pair_sums(constant_parts(first + 2 * kDescriptorSize),
+                                  constant_parts(first + 3 * kDescriptorSize));
+    const __m512i quarters =
+        _mm512_add_epi32(_mm512_unpacklo_epi64(even, odd), _mm512_unpackhi_epi64(even, odd));
+    const __m256i halves =
+        _mm256_add_epi32(_mm512_castsi512_si256(quarters), _mm512_extracti64x4_epi64(quarters, 1));
+    const __m128i sums =
+        _mm_add_epi32(_mm256_castsi256_si128(halves), _mm256_extracti128_si256(halves, 1));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(constants + i), sums);
+  }
+  for (; i < num_descriptors; ++i) {
+    constants[i] = _mm512_reduce_add_epi32(constant_parts(descriptors + i * kDescriptorSize));
   }
 }
 
@@ -253,6 +276,8 @@ const Kernels kAvx512Kernels{"avx512",
                              hessian_row,
                              maxima_row,
                              upright_cells,
-                             describe};
+                             describe,
+                             solve_samples,
+                             epipolar_score};
 
 }  // namespace loopbit

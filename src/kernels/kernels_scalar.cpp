@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <bit>
 
+#include "epipolar_loops.inc"
 #include "kernel_variants.hpp"
 #include "surf_loops.inc"
 
@@ -137,6 +138,7 @@ const Kernels kScalarKernels{"scalar",         max_overlaps<overlap>,
                              nearest_two,      add_pixels,
                              linear_row,       integral_row,
                              hessian_row,      maxima_row,
-                             upright_cells,    describe};
+                             upright_cells,    describe,
+                             solve_samples,    epipolar_score};
 
 }  // namespace loopbit

@@ -10,31 +10,18 @@
 namespace loopbit {
 namespace {
 
-constexpr std::size_t kSample = 7;
 constexpr int kMaxSamples = 500;
 constexpr double kConfidence = 0.999;
 constexpr int kRefits = 6;
-
-using Row = std::array<double, 9>;
-using Pair = EpipolarRansac::Pair;
-
-/// One row of the epipolar constraint, for the elements of F row by row.
-Row constraint(const Pair& p) {
-  const double x0 = p.x0;
-  const double y0 = p.y0;
-  const double x1 = p.x1;
-  const double y1 = p.y1;
-  return {x1 * x0, x1 * y0, x1, y1 * x0, y1 * y0, y1, x0, y0, 1.0};
-}
 
 /// Different numbers from 0 to n - 1, the same for each run.
 class Samples {
  public:
   explicit Samples(std::size_t n) : n_(n) {}
 
-  std::array<std::size_t, kSample> next() {
-    std::array<std::size_t, kSample> sample{};
-    for (std::size_t i = 0; i < kSample; ++i) {
+  std::array<std::size_t, kSamplePairs> next() {
+    std::array<std::size_t, kSamplePairs> sample{};
+    for (std::size_t i = 0; i < kSamplePairs; ++i) {
       do {
         sample[i] = draw();
       } while (std::find(sample.begin(), sample.begin() + i, sample[i]) != sample.begin() + i);
@@ -54,21 +41,19 @@ class Samples {
   std::uint64_t state_ = 2019;
 };
 
-double determinant(const Row& f) {
-  return f[0] * (f[4] * f[8] - f[5] * f[7]) - f[1] * (f[3] * f[8] - f[5] * f[6]) +
-         f[2] * (f[3] * f[7] - f[4] * f[6]);
-}
-
-Row cofactors(const Row& f) {
-  return {f[4] * f[8] - f[5] * f[7], f[5] * f[6] - f[3] * f[8], f[3] * f[7] - f[4] * f[6],
-          f[2] * f[7] - f[1] * f[8], f[0] * f[8] - f[2] * f[6], f[1] * f[6] - f[0] * f[7],
-          f[1] * f[5] - f[2] * f[4], f[2] * f[3] - f[0] * f[5], f[0] * f[4] - f[1] * f[3]};
-}
-
-double dot(const Row& a, const Row& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
+/// The pairs of the next samples.
+PairSamples gather(Samples& samples, const PointPairs& pairs) {
+  PairSamples gathered;
+  for (std::size_t lane = 0; lane < kSampleLanes; ++lane) {
+    const auto sample = samples.next();
+    for (std::size_t k = 0; k < kSamplePairs; ++k) {
+      gathered.x0[k][lane] = pairs.x0[sample[k]];
+      gathered.y0[k][lane] = pairs.y0[sample[k]];
+      gathered.x1[k][lane] = pairs.x1[sample[k]];
+      gathered.y1[k][lane] = pairs.y1[sample[k]];
+    }
+  }
+  return gathered;
 }
 
 /// The real roots of a x^3 + b x^2 + c x + d; returns how many. None where a is 0: that is the
@@ -95,50 +80,25 @@ int cubic_roots(double a, double b, double c, double d, std::array<double, 3>& r
   return 1;
 }
 
-/// Brings 7 rows to [identity, rest], columns in order; false where they do not determine it.
-bool eliminate(std::array<Row, kSample>& rows) {
-  constexpr double kMinPivot = 1e-9;
-  for (std::size_t i = 0; i < kSample; ++i) {
-    std::size_t pivot = i;
-    for (std::size_t k = i + 1; k < kSample; ++k) {
-      if (std::abs(rows[k][i]) > std::abs(rows[pivot][i])) pivot = k;
-    }
-    if (std::abs(rows[pivot][i]) < kMinPivot) return false;
-    std::swap(rows[i], rows[pivot]);
-    // The pivot's row is 0 before column i. Taking that in, too, makes loops of one length.
-    const double factor = 1 / rows[i][i];
-    for (double& element : rows[i]) element *= factor;
-    const Row pivot_row = rows[i];
-    for (std::size_t k = 0; k < kSample; ++k) {
-      if (k == i) continue;
-      const double part = rows[k][i];
-      for (std::size_t j = 0; j < 9; ++j) rows[k][j] -= part * pivot_row[j];
-    }
-  }
-  return true;
-}
-
-/// The one to three fundamental matrices of seven pairs; returns how many.
-int seven_point(std::array<Row, kSample>& rows, std::array<cv::Matx33d, 3>& models) {
-  if (!eliminate(rows)) return 0;
-  Row f{};
-  Row g{};
-  for (std::size_t i = 0; i < kSample; ++i) {
-    f[i] = -rows[i][7];
-    g[i] = -rows[i][8];
-  }
-  f[7] = 1;
-  g[8] = 1;
-  // det(f + x g) = 0
+/// The one to three fundamental matrices of one sample; returns how many.
+int matrices_of(const EpipolarPencils& pencils, std::size_t lane,
+                std::array<cv::Matx33d, 3>& models) {
+  if (pencils.is_determined[lane] == 0) return 0;
+  const auto& determinant = pencils.determinant;
   std::array<double, 3> roots{};
-  const int count = cubic_roots(determinant(g), dot(cofactors(g), f), dot(cofactors(f), g),
-                                determinant(f), roots);
-  for (int i = 0; i < count; ++i) {
+  const int count = cubic_roots(determinant[3][lane], determinant[2][lane], determinant[1][lane],
+                                determinant[0][lane], roots);
+  int finite = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+    cv::Matx33d& model = models[static_cast<std::size_t>(finite)];
     for (std::size_t k = 0; k < 9; ++k) {
-      models[static_cast<std::size_t>(i)].val[k] = f[k] + roots[static_cast<std::size_t>(i)] * g[k];
+      model.val[k] = pencils.f[k][lane] + roots[i] * pencils.g[k][lane];
     }
+    // Their size means nothing, so it is 1: no product of elements overflows then.
+    model *= 1 / cv::norm(model, cv::NORM_INF);
+    finite += std::isfinite(model(0, 0)) ? 1 : 0;
   }
-  return count;
+  return finite;
 }
 
 /// The nearest matrix of rank two: without the part along the right singular vector of the smallest
@@ -151,30 +111,10 @@ cv::Matx33d rank_two(const cv::Matx33d& f) {
   return f - f * smallest * smallest.t();
 }
 
-/// Of the square of Sampson's distance: numerator and denominator.
-struct Sampson {
-  explicit Sampson(const cv::Matx33d& model) {
-    for (int i = 0; i < 9; ++i) f[i] = static_cast<float>(model.val[i]);
-  }
-
-  [[nodiscard]] bool measure(const Pair& p, float max_error_sq, float& error_sq) const {
-    const float ax = f[0] * p.x0 + f[1] * p.y0 + f[2];
-    const float ay = f[3] * p.x0 + f[4] * p.y0 + f[5];
-    const float az = f[6] * p.x0 + f[7] * p.y0 + f[8];
-    const float bx = f[0] * p.x1 + f[3] * p.y1 + f[6];
-    const float by = f[1] * p.x1 + f[4] * p.y1 + f[7];
-    const float e = p.x1 * ax + p.y1 * ay + az;
-    error_sq = e * e / (ax * ax + ay * ay + bx * bx + by * by);
-    return error_sq <= max_error_sq;
-  }
-
-  float f[9];
-};
-
 /// Samples that suffice to draw one of inliers only with the confidence.
 int samples_needed(int inliers, std::size_t pairs) {
   const double share = static_cast<double>(inliers) / static_cast<double>(pairs);
-  const double hit = std::pow(share, static_cast<double>(kSample));
+  const double hit = std::pow(share, static_cast<double>(kSamplePairs));
   if (hit >= kConfidence) return 1;
   const double needed = std::log(1 - kConfidence) / std::log1p(-hit);
   return needed < kMaxSamples ? static_cast<int>(std::ceil(needed)) : kMaxSamples;
@@ -192,38 +132,32 @@ void EpipolarRansac::normalize(std::span<const Pair> pairs, double max_error_px)
   }
   const auto n = static_cast<float>(pairs.size());
   mean = {mean.x0 / n, mean.y0 / n, mean.x1 / n, mean.y1 / n};
+  const std::size_t stride = is_inlier_.size();
+  coordinates_.assign(4 * stride, 0.0F);
+  float* x0 = coordinates_.data();
+  float* y0 = x0 + stride;
+  float* x1 = y0 + stride;
+  float* y1 = x1 + stride;
+  pairs_ = {x0, y0, x1, y1, pairs.size()};
   float spread = 0;
-  pairs_.clear();
-  pairs_.reserve(pairs.size());
-  for (const Pair& p : pairs) {
-    pairs_.push_back({p.x0 - mean.x0, p.y0 - mean.y0, p.x1 - mean.x1, p.y1 - mean.y1});
-    const Pair& q = pairs_.back();
-    spread += std::abs(q.x0) + std::abs(q.y0) + std::abs(q.x1) + std::abs(q.y1);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    x0[i] = pairs[i].x0 - mean.x0;
+    y0[i] = pairs[i].y0 - mean.y0;
+    x1[i] = pairs[i].x1 - mean.x1;
+    y1[i] = pairs[i].y1 - mean.y1;
+    spread += std::abs(x0[i]) + std::abs(y0[i]) + std::abs(x1[i]) + std::abs(y1[i]);
   }
   // One unit for both images, so that distances keep their proportion.
   const float unit = spread > 0 ? spread / (4 * n) : 1.0F;
-  for (Pair& p : pairs_) p = {p.x0 / unit, p.y0 / unit, p.x1 / unit, p.y1 / unit};
+  for (float& coordinate : coordinates_) coordinate /= unit;
   max_error_sq_ = static_cast<float>(max_error_px * max_error_px) / (unit * unit);
 }
 
-EpipolarRansac::Score EpipolarRansac::score(const cv::Matx33d& model) const {
-  const Sampson sampson(model);
-  Score score;
-  for (const Pair& p : pairs_) {
-    float error_sq = 0;
-    const bool inlier = sampson.measure(p, max_error_sq_, error_sq);
-    score.inliers += inlier ? 1 : 0;
-    score.cost += inlier ? error_sq : max_error_sq_;
-  }
-  return score;
-}
-
-void EpipolarRansac::mark(const cv::Matx33d& model) {
-  const Sampson sampson(model);
-  float error_sq = 0;
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    is_inlier_[i] = sampson.measure(pairs_[i], max_error_sq_, error_sq) ? 1 : 0;
-  }
+EpipolarScore EpipolarRansac::score(const cv::Matx33d& model) {
+  std::array<float, 9> elements{};
+  std::transform(std::begin(model.val), std::end(model.val), elements.begin(),
+                 [](double element) { return static_cast<float>(element); });
+  return kernels_.epipolar_score(elements.data(), pairs_, max_error_sq_, is_inlier_.data());
 }
 
 /// The matrix that fits all inliers best, by the eight-point algorithm. What minimizes the sum of
@@ -232,9 +166,13 @@ void EpipolarRansac::mark(const cv::Matx33d& model) {
 cv::Matx33d EpipolarRansac::fit() const {
   using Vector = cv::Matx<double, 9, 1>;
   cv::Matx<double, 9, 9> squares = cv::Matx<double, 9, 9>::zeros();
-  for (std::size_t k = 0; k < pairs_.size(); ++k) {
+  for (std::size_t k = 0; k < pairs_.count; ++k) {
     if (is_inlier_[k] == 0) continue;
-    const Vector row(constraint(pairs_[k]).data());
+    const double x0 = pairs_.x0[k];
+    const double y0 = pairs_.y0[k];
+    const double x1 = pairs_.x1[k];
+    const double y1 = pairs_.y1[k];
+    const Vector row(x1 * x0, x1 * y0, x1, y1 * x0, y1 * y0, y1, x0, y0, 1.0);
     squares += row * row.t();
   }
   // Where the inliers agree exactly there is no inverse without a little on the diagonal.
@@ -251,11 +189,11 @@ cv::Matx33d EpipolarRansac::fit() const {
   return rank_two(cv::Matx33d(f.val));
 }
 
+/// Expects is_inlier_ to be that of the best model.
 void EpipolarRansac::refit() {
-  for (int i = 0; i < kRefits && best_score_.inliers > static_cast<int>(kSample); ++i) {
-    mark(best_);
+  for (int i = 0; i < kRefits && best_score_.inliers > static_cast<int>(kSamplePairs); ++i) {
     const cv::Matx33d model = fit();
-    const Score refitted = score(model);
+    const EpipolarScore refitted = score(model);
     if (refitted.cost >= best_score_.cost) return;
     best_ = model;
     best_score_ = refitted;
@@ -263,7 +201,7 @@ void EpipolarRansac::refit() {
 }
 
 void EpipolarRansac::offer(const cv::Matx33d& model) {
-  const Score offered = score(model);
+  const EpipolarScore offered = score(model);
   if (offered.cost >= best_score_.cost) return;
   best_ = model;
   best_score_ = offered;
@@ -271,27 +209,26 @@ void EpipolarRansac::offer(const cv::Matx33d& model) {
 }
 
 int EpipolarRansac::find(std::span<const Pair> pairs, double max_error_px) {
-  is_inlier_.assign(pairs.size(), 0);
-  if (pairs.size() <= kSample) return 0;
+  pairs_.count = pairs.size();
+  is_inlier_.assign((pairs.size() / kPairBlock + 1) * kPairBlock, 0);
+  if (pairs.size() <= kSamplePairs) return 0;
   normalize(pairs, max_error_px);
   best_score_ = {max_error_sq_ * static_cast<float>(pairs.size()), 0};
   Samples samples(pairs.size());
-  std::array<Row, kSample> rows;
+  EpipolarPencils pencils;
   std::array<cv::Matx33d, 3> models;
-  int needed = samples_needed(static_cast<int>(kSample) + 1, pairs.size());
+  int needed = samples_needed(static_cast<int>(kSamplePairs) + 1, pairs.size());
   for (int i = 0; i < needed; ++i) {
-    const auto sample = samples.next();
-    for (std::size_t k = 0; k < kSample; ++k) rows[k] = constraint(pairs_[sample[k]]);
-    const int count = seven_point(rows, models);
+    const std::size_t lane = static_cast<std::size_t>(i) % kSampleLanes;
+    if (lane == 0) kernels_.solve_samples(gather(samples, pairs_), pencils);
     const int before = best_score_.inliers;
+    const int count = matrices_of(pencils, lane, models);
     for (int k = 0; k < count; ++k) offer(models[static_cast<std::size_t>(k)]);
     if (best_score_.inliers > before) {
       needed = std::min(needed, samples_needed(best_score_.inliers, pairs.size()));
     }
   }
-  if (best_score_.inliers == 0) return 0;
-  mark(best_);
-  return best_score_.inliers;
+  return best_score_.inliers > 0 ? score(best_).inliers : 0;
 }
 
 }  // namespace loopbit

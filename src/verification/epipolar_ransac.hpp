@@ -9,6 +9,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "loopbit/kernels.hpp"
+
 namespace loopbit {
 
 /// The fundamental matrix that explains most of a set of matches: RANSAC over minimal samples of
@@ -26,30 +28,30 @@ class EpipolarRansac {
     float y1 = 0;
   };
 
+  explicit EpipolarRansac(const Kernels& kernels) : kernels_(kernels) {}
+
   /// is_inlier()[i] tells whether pairs[i] lies within `max_error_px` of the geometry, by Sampson's
   /// distance; returns how many do. 0 below 8 pairs, or where no sample determines a geometry.
   int find(std::span<const Pair> pairs, double max_error_px);
 
-  [[nodiscard]] std::span<const std::uint8_t> is_inlier() const { return is_inlier_; }
+  [[nodiscard]] std::span<const std::uint8_t> is_inlier() const {
+    return std::span(is_inlier_).first(pairs_.count);
+  }
 
  private:
-  struct Score {
-    float cost = 0;
-    int inliers = 0;
-  };
-
   void normalize(std::span<const Pair> pairs, double max_error_px);
-  [[nodiscard]] Score score(const cv::Matx33d& model) const;
+  [[nodiscard]] EpipolarScore score(const cv::Matx33d& model);
   void offer(const cv::Matx33d& model);
   [[nodiscard]] cv::Matx33d fit() const;
   void refit();
-  void mark(const cv::Matx33d& model);
 
-  std::vector<Pair> pairs_;  ///< about their mean, in units of their spread
+  const Kernels& kernels_;
+  std::vector<float> coordinates_;  ///< about their mean, in units of their spread
+  PointPairs pairs_;                ///< in coordinates_
   float max_error_sq_ = 0;
   cv::Matx33d best_;
-  Score best_score_;
-  std::vector<std::uint8_t> is_inlier_;
+  EpipolarScore best_score_;
+  std::vector<std::uint8_t> is_inlier_;  ///< of the model that was scored last
 };
 
 }  // namespace loopbit

@@ -84,7 +84,7 @@ void FeatureMatcher::match_group(Descriptors query, std::span<const int> asked, 
   matches_.clear();
   if (asked.empty() || place.empty()) return;
   find_one_way(query, asked, place, max_ratio);
-  keep_mutual(query, place, max_ratio);
+  if (!matches_.empty()) keep_mutual(query, place, max_ratio);
 }
 
 void FeatureMatcher::match(const Features& query, const Features& place, double max_ratio,
