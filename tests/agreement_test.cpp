@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -132,6 +133,40 @@ TEST(Agreement, WithoutInliersThereIsNoScore) {
   Agreement agreement(halves());
   agreement.remember({candidate(100, 50)});
   EXPECT_DOUBLE_EQ(agreement.score(candidate(100, 0), true), 0);
+}
+
+using Places = std::vector<PlaceId>;
+
+TEST(Agreement, FollowsTheWaysWithMostSupport) {
+  DecisionOptions options = halves();
+  options.followed_ways = 2;
+  Agreement agreement(options);
+  EXPECT_EQ(agreement.followed_places(), Places{});
+  agreement.remember({candidate(10, 20), candidate(30, 40), candidate(33, 38), candidate(50, 28),
+                      candidate(70, 8)});
+  EXPECT_EQ(agreement.followed_places(), (Places{7 * 30, 7 * 50}));
+  options.followed_ways = 0;
+  Agreement none(options);
+  none.remember({candidate(30, 40)});
+  EXPECT_EQ(none.followed_places(), Places{});
+}
+
+TEST(Agreement, FollowsAWayUntilItsSupportHasFaded) {
+  Agreement agreement(halves());
+  agreement.remember({candidate(10, 24)});
+  for (const int step : {11, 12, 13, 14}) {
+    agreement.remember({candidate(step, 3), candidate(40, 7)});
+    EXPECT_EQ(agreement.followed_places(), Places{7 * step});  // support 8, 4, 2, 1
+  }
+  agreement.remember({candidate(15, 3)});
+  EXPECT_EQ(agreement.followed_places(), Places{});
+}
+
+TEST(Agreement, FollowsNoWayThatIsNotGoneOn) {
+  Agreement agreement(halves());
+  agreement.remember({candidate(10, 48)});
+  agreement.remember({candidate(20, 3)});
+  EXPECT_EQ(agreement.followed_places(), Places{});
 }
 
 TEST(InlierWorth, GrowsWithTheShareUpToTheFullOne) {

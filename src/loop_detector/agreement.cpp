@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <utility>
 
 namespace loopbit {
@@ -13,6 +14,9 @@ namespace {
 /// A match moves at most this many steps along the past for each step of the query, either way:
 /// revisits may be slower or faster than the first visit, and candidates are only so finely spaced.
 constexpr std::ptrdiff_t kMaxStepsPerStep = 3;
+
+/// With less support a way is not followed.
+constexpr double kMinFollowedSupport = 1.0;
 
 }  // namespace
 
@@ -53,9 +57,25 @@ void Agreement::remember(const std::vector<VerifiedCandidate>& step) {
   for (const VerifiedCandidate& v : step) {
     if (is_known_place && beyond_chance(v) == 0) continue;
     const double before = options_.agreement_memory * support_near(latest_, v.step);
-    trails.push_back({v.step, beyond_chance(v) + before});
+    trails.push_back({v.candidate.place, v.step, beyond_chance(v) + before});
   }
   before_latest_ = std::exchange(latest_, std::move(trails));
+}
+
+std::vector<PlaceId> Agreement::followed_places() const {
+  std::vector<Trail> trails = latest_;
+  std::stable_sort(trails.begin(), trails.end(),
+                   [](const Trail& a, const Trail& b) { return a.support > b.support; });
+  std::vector<Trail> followed;
+  for (const Trail& trail : trails) {
+    if (trail.support < kMinFollowedSupport || std::ssize(followed) == options_.followed_ways)
+      break;
+    if (support_near(followed, trail.step) == 0) followed.push_back(trail);
+  }
+  std::vector<PlaceId> places;
+  places.reserve(followed.size());
+  for (const Trail& trail : followed) places.push_back(trail.place);
+  return places;
 }
 
 }  // namespace loopbit

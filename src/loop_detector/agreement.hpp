@@ -49,9 +49,15 @@ class Agreement {
   /// map of few places, of which nearly all are candidates.
   void remember(const std::vector<VerifiedCandidate>& step);
 
+  /// Where the ways that the robot may be following stood at the last step, those with most support
+  /// first: at most `options.followed_ways`, far enough apart to be different ones, and none whose
+  /// support has faded to less than one inlier.
+  [[nodiscard]] std::vector<PlaceId> followed_places() const;
+
  private:
   /// The evidence of a way along the past, up to one of its steps.
   struct Trail {
+    PlaceId place = 0;
     std::ptrdiff_t step = 0;
     double support = 0;
   };

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -136,8 +137,9 @@ class LoopDetector::Impl {
     seen.earlier_steps = steps_before(end);
     detection.times.verification_ms = stopwatch.lap_ms();
 
-    // Step 2: the earlier places that look alike.
-    const auto candidates = index_.query(seen.content, end, options_.retrieval);
+    // Step 2: the earlier places that look alike, and those where the robot is expected.
+    auto candidates = index_.query(seen.content, end, options_.retrieval);
+    add_expected(seen.content, end, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that geometry and the frames before agree on.
@@ -295,6 +297,30 @@ class LoopDetector::Impl {
     return std::tuple(agreement_.score(v, seen.look.is_step), v.matches, v.candidate.similarity);
   }
 
+  [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const {
+    return {place,
+            similarity(content, index_.content(place), options_.retrieval.shift_tolerance_columns)};
+  }
+
+  /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
+  /// while.
+  void add_expected(const BinaryContent& content, PlaceId end,
+                    std::vector<Candidate>& candidates) const {
+    const int reach = options_.retrieval.min_spacing;
+    for (const PlaceId followed : agreement_.followed_places()) {
+      const PlaceId last = std::min(end - 1, followed + reach);
+      for (PlaceId place = std::max(0, followed - reach); place <= last; ++place) {
+        const bool is_there =
+            std::any_of(candidates.begin(), candidates.end(),
+                        [&](const Candidate& other) { return other.place == place; });
+        if (is_there) continue;
+        const Candidate expected = candidate(place, content);
+        // Nothing is like a frame that could not be read.
+        if (expected.similarity > 0) candidates.push_back(expected);
+      }
+    }
+  }
+
   /// The places around a candidate. Candidates stand apart, so one of these may be the best.
   [[nodiscard]] std::vector<Candidate> beside(PlaceId middle, PlaceId end,
                                               const BinaryContent& content) const {
@@ -302,9 +328,7 @@ class LoopDetector::Impl {
     std::vector<Candidate> places;
     for (PlaceId place = std::max(0, middle - radius); place <= std::min(end - 1, middle + radius);
          ++place) {
-      if (place == middle) continue;
-      places.push_back({place, similarity(content, index_.content(place),
-                                          options_.retrieval.shift_tolerance_columns)});
+      if (place != middle) places.push_back(candidate(place, content));
     }
     return places;
   }

@@ -49,6 +49,7 @@ struct DecisionOptions {
   double chance_evidence = 10.0;
   double agreement_weight = 0.4;
   double agreement_memory = 0.8;
+  int followed_ways = 3;
   bool count_matches = false;
 
   static constexpr auto fields() {
@@ -71,6 +72,9 @@ struct DecisionOptions {
               "alone"},
         Field{"agreement_memory", &S::agreement_memory, 0.0, 0.99,
               "part of the support that is left after each further change of view"},
+        Field{"followed_ways", &S::followed_ways, 0, 1000,
+              "where the ways with most support, so many of them, go on, places are candidates "
+              "whether they look alike or not"},
         switch_field("count_matches", &S::count_matches,
                      "the evidence is the number of matches alone, without geometry, as in the "
                      "paper")};
