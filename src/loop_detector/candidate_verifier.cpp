@@ -48,6 +48,7 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
 }
 
 VerifiedCandidate CandidateVerifier::closest(const Query& query, const VerifiedCandidate& candidate,
+                                             const std::vector<VerifiedCandidate>& verified,
                                              const std::vector<Candidate>& beside) {
   const auto closeness = [](const VerifiedCandidate& v) {
     return std::tuple(v.distinct_inliers, v.inliers, v.candidate.similarity);
@@ -58,11 +59,11 @@ VerifiedCandidate CandidateVerifier::closest(const Query& query, const VerifiedC
   order.resize(std::min(order.size(), kMaxBeside));
   for (const std::size_t i : order) {
     VerifiedCandidate& neighbour = neighbours[i];
-    match(query, neighbour, verification_);
+    Verification& result = match_once(query, verified, neighbour);
     if (neighbour.matches < best.distinct_inliers) continue;
-    find_geometry(query, neighbour, verification_);
+    if (neighbour.inliers == 0) find_geometry(query, neighbour, result);
     if (closeness(neighbour) <= closeness(best)) continue;
-    find_distinctness(neighbour, verification_);
+    find_distinctness(neighbour, result);
     best = neighbour;
   }
   return best;
@@ -115,6 +116,21 @@ void CandidateVerifier::match(const Query& query, VerifiedCandidate& candidate,
                               Verification& result) {
   verifier_.match(query.features, places_.features(candidate.candidate.place), result);
   candidate.matches = static_cast<int>(result.matches.size());
+}
+
+/// The same, unless it is one of `verified` and was matched before; returns its matches.
+Verification& CandidateVerifier::match_once(const Query& query,
+                                            const std::vector<VerifiedCandidate>& verified,
+                                            VerifiedCandidate& candidate) {
+  for (std::size_t i = 0; i < verified.size(); ++i) {
+    if (verified[i].matches == 0 || verified[i].candidate.place != candidate.candidate.place) {
+      continue;
+    }
+    candidate = verified[i];
+    return verifications_[i];
+  }
+  match(query, candidate, verification_);
+  return verification_;
 }
 
 /// The second half: their geometry.

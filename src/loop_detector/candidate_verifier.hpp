@@ -43,9 +43,10 @@ class CandidateVerifier {
   std::vector<VerifiedCandidate> verify(const Query& query,
                                         const std::vector<Candidate>& candidates);
 
-  /// The one with most inliers of `candidate`, which verify() returned for this query, and of
-  /// places beside it: all are the same place, or none.
+  /// The one with most inliers of `candidate`, one of those that verify() returned for this query,
+  /// and of places beside it: all are the same place, or none.
   VerifiedCandidate closest(const Query& query, const VerifiedCandidate& candidate,
+                            const std::vector<VerifiedCandidate>& verified,
                             const std::vector<Candidate>& beside);
 
   /// Verifies in full those that verify() left out.
@@ -59,6 +60,8 @@ class CandidateVerifier {
                                       const std::vector<VerifiedCandidate>& verified,
                                       std::vector<Verification>& looks);
   void match(const Query& query, VerifiedCandidate& candidate, Verification& result);
+  Verification& match_once(const Query& query, const std::vector<VerifiedCandidate>& verified,
+                           VerifiedCandidate& candidate);
   void find_geometry(const Query& query, VerifiedCandidate& candidate, Verification& result);
   void find_distinctness(VerifiedCandidate& candidate, const Verification& result) const;
   [[nodiscard]] double highest_score(const Query& query, VerifiedCandidate candidate) const;

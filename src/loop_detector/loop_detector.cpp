@@ -353,7 +353,7 @@ class LoopDetector::Impl {
     // Below, a neighbour is no likelier to be right than any other place.
     const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
     if (score() > options_.decision.chance_evidence) {
-      best = candidates_.closest(verified_query(seen), best,
+      best = candidates_.closest(verified_query(seen), best, seen.verified,
                                  beside(best.candidate.place, end, seen.content));
     }
     seen.best = best;
