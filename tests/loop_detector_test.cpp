@@ -252,18 +252,6 @@ TEST(LoopDetector, FollowsAWayWherePlacesDoNotLookAlike) {
   EXPECT_EQ(loops_after_one_that_looks_alike(options), 0);
 }
 
-TEST(LoopDetector, FollowsAWayPastFramesThatCouldNotBeRead) {
-  LoopDetectorOptions options = short_window_options();
-  options.retrieval.min_similarity = 1.0;
-  LoopDetector detector = after_places(0, 4, options);
-  detector.skip(std::nullopt);
-  for (int place = 6; place < 12; ++place) detector.process(view(place));
-  ASSERT_EQ(detector.process(view(2)).match, 2);
-  expect_consistent(detector.process(view(30)), options);
-  EXPECT_EQ(detector.process(again(4)).match, 4);
-  EXPECT_NE(detector.process(view(31)).match, 5);
-}
-
 TEST(LoopDetector, AFirstLookPutsTheRightCandidateFirst) {
   LoopDetectorOptions options = short_window_options();
   options.verification.max_closer_looks = 1;
