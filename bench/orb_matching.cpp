@@ -12,6 +12,7 @@ namespace loopbit::bench {
 namespace {
 
 std::vector<Match> matches(const cv::Mat& a, const cv::Mat& b) {
+  if (a.empty() || b.empty()) return {};  // a blank wall has no corners
   const cv::BFMatcher matcher(cv::NORM_HAMMING);
   std::vector<std::vector<cv::DMatch>> there;
   std::vector<std::vector<cv::DMatch>> back;
