@@ -302,14 +302,22 @@ class LoopDetector::Impl {
             similarity(content, index_.content(place), options_.retrieval.shift_tolerance_columns)};
   }
 
+  /// The places below `end` that lie no farther from `middle` than candidates stand apart.
+  [[nodiscard]] std::vector<PlaceId> around(PlaceId middle, PlaceId end) const {
+    const int radius = options_.retrieval.min_spacing;
+    const PlaceId first = std::max(0, middle - radius);
+    const PlaceId last = std::min(end - 1, middle + radius);
+    std::vector<PlaceId> places;
+    for (PlaceId place = first; place <= last; ++place) places.push_back(place);
+    return places;
+  }
+
   /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
   /// while.
   void add_expected(const BinaryContent& content, PlaceId end,
                     std::vector<Candidate>& candidates) const {
-    const int reach = options_.retrieval.min_spacing;
     for (const PlaceId followed : agreement_.followed_places()) {
-      const PlaceId last = std::min(end - 1, followed + reach);
-      for (PlaceId place = std::max(0, followed - reach); place <= last; ++place) {
+      for (const PlaceId place : around(followed, end)) {
         const bool is_there =
             std::any_of(candidates.begin(), candidates.end(),
                         [&](const Candidate& other) { return other.place == place; });
@@ -324,10 +332,8 @@ class LoopDetector::Impl {
   /// The places around a candidate. Candidates stand apart, so one of these may be the best.
   [[nodiscard]] std::vector<Candidate> beside(PlaceId middle, PlaceId end,
                                               const BinaryContent& content) const {
-    const int radius = options_.retrieval.min_spacing;
     std::vector<Candidate> places;
-    for (PlaceId place = std::max(0, middle - radius); place <= std::min(end - 1, middle + radius);
-         ++place) {
+    for (const PlaceId place : around(middle, end)) {
       if (place != middle) places.push_back(candidate(place, content));
     }
     return places;

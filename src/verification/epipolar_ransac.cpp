@@ -95,8 +95,10 @@ int matrices_of(const EpipolarPencils& pencils, std::size_t lane,
       model.val[k] = pencils.f[k][lane] + roots[i] * pencils.g[k][lane];
     }
     // Their size means nothing, so it is 1: no product of elements overflows then.
-    model *= 1 / cv::norm(model, cv::NORM_INF);
-    finite += std::isfinite(model(0, 0)) ? 1 : 0;
+    const double size = cv::norm(model, cv::NORM_INF);
+    if (size == 0 || !std::isfinite(size)) continue;
+    model *= 1 / size;
+    ++finite;
   }
   return finite;
 }

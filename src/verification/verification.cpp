@@ -59,7 +59,7 @@ Range middle(std::vector<float>& values) {
 /// What matches say about two views; keeps its memory from pair to pair.
 class Geometry {
  public:
-  explicit Geometry(const Kernels& kernels) : ransac_(kernels) {}
+  explicit Geometry(const Kernels& kernels = active_kernels()) : ransac_(kernels) {}
 
   void find_inliers(const Features& query, const Features& place, std::span<const Match> matches,
                     double max_error_px, std::vector<Match>& inliers) {
@@ -202,17 +202,17 @@ std::vector<Match> match_features(const Features& query, const Features& place, 
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
                                     const std::vector<Match>& matches, double max_error_px) {
   std::vector<Match> inliers;
-  Geometry(active_kernels()).find_inliers(query, place, matches, max_error_px, inliers);
+  Geometry().find_inliers(query, place, matches, max_error_px, inliers);
   return inliers;
 }
 
 int distinct_inliers(const Features& query, const Features& place,
                      const std::vector<Match>& inliers, double min_spacing_scales) {
-  return Geometry(active_kernels()).count_distinct(query, place, inliers, min_spacing_scales);
+  return Geometry().count_distinct(query, place, inliers, min_spacing_scales);
 }
 
 double explained_share(const Features& query, const std::vector<Match>& inliers) {
-  return Geometry(active_kernels()).explained_share(query, inliers);
+  return Geometry().explained_share(query, inliers);
 }
 
 Verification verify(const Features& query, const Features& place,
