@@ -72,9 +72,10 @@ struct DecisionOptions {
               "alone"},
         Field{"agreement_memory", &S::agreement_memory, 0.0, 0.99,
               "part of the support that is left after each further change of view"},
-        Field{"followed_ways", &S::followed_ways, 0, 1000,
-              "where the ways with most support, so many of them, go on, places are candidates "
-              "whether they look alike or not"},
+        Field{
+            "followed_ways", &S::followed_ways, 0, 1000,
+            "ways along the past with most support that are followed: places where they go on are "
+            "candidates whether they look alike or not; 0 = none"},
         switch_field("count_matches", &S::count_matches,
                      "the evidence is the number of matches alone, without geometry, as in the "
                      "paper")};
