@@ -123,10 +123,8 @@ double full_scan_ms(const PlaceIndex& index, const std::vector<BinaryContent>& q
   for (std::size_t scan = 0; scan < kScans; ++scan) {
     const BinaryContent& query = queries[scan];
     const double start_ms = thread_ms();
-    std::vector<BinaryContent> shifted;
-    for (int s = -options.shift_tolerance_columns; s <= options.shift_tolerance_columns; ++s) {
-      shifted.push_back(shift_columns(query, s));
-    }
+    const std::vector<BinaryContent> shifted =
+        tolerated_shifts(query, options.shift_tolerance_columns);
     double best = 0;
     for (PlaceId place = 0; place < index.size(); ++place) {
       std::uint16_t overlap = 0;

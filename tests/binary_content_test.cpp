@@ -7,6 +7,7 @@
 #include <cmath>
 #include <complex>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -393,14 +394,25 @@ TEST(Content, SimilarityIsSymmetricAndOneForItself) {
   }
 }
 
-TEST(Content, SimilarityWithAToleranceIsTheBestOverAllShifts) {
+TEST(Content, ShiftsAreToleratedByEvenNumbersOfColumnsAndTheToleranceItself) {
+  Random random;
+  const BinaryContent content = random_content(random, 0.2);
+  const std::vector<std::pair<int, std::vector<int>>> cases{
+      {0, {0}}, {1, {-1, 0, 1}}, {4, {-4, -2, 0, 2, 4}}, {5, {-5, -4, -2, 0, 2, 4, 5}}};
+  for (const auto& [tolerance, shifts] : cases) {
+    std::vector<BinaryContent> expected;
+    for (const int columns : shifts) expected.push_back(shift_columns(content, columns));
+    EXPECT_EQ(tolerated_shifts(content, tolerance), expected) << tolerance;
+  }
+}
+
+TEST(Content, SimilarityWithAToleranceIsTheBestOfTheToleratedShifts) {
   Random random;
   const BinaryContent a = random_content(random, 0.2);
   const BinaryContent b = random_content(random, 0.3);
   for (const int tolerance : {0, 1, 4, 32}) {
     double best = 0;
-    for (int columns = -tolerance; columns <= tolerance; ++columns) {
-      const BinaryContent moved = shift_columns(a, columns);
+    for (const BinaryContent& moved : tolerated_shifts(a, tolerance)) {
       int overlap = 0;
       for (std::size_t y = 0; y < 64; ++y) overlap += std::popcount(moved.rows[y] & b.rows[y]);
       best = std::max(best, static_cast<double>(overlap) / std::max(count(a), count(b)));

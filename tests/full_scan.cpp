@@ -32,11 +32,7 @@ bool is_within_limits(const BinaryContent& query, const BinaryContent& place,
 
 std::vector<Candidate> full_scan(const Contents& places, const BinaryContent& query, PlaceId end,
                                  const RetrievalOptions& options) {
-  Contents shifted;
-  for (int columns = -options.shift_tolerance_columns; columns <= options.shift_tolerance_columns;
-       ++columns) {
-    shifted.push_back(shift_columns(query, columns));
-  }
+  const Contents shifted = tolerated_shifts(query, options.shift_tolerance_columns);
   std::vector<Candidate> left;
   for (PlaceId i = 0; i < end; ++i) {
     const BinaryContent& place = places[static_cast<std::size_t>(i)];

@@ -65,12 +65,8 @@ void fill_matrix(const Contents& queries, const Contents& places, int shift_tole
   std::vector<int> counts(places.size());
   std::transform(places.begin(), places.end(), counts.begin(), count);
   std::vector<std::uint16_t> overlaps(places.size());
-  Contents shifted;
   for (const BinaryContent& query : queries) {
-    shifted.clear();
-    for (int columns = -shift_tolerance_columns; columns <= shift_tolerance_columns; ++columns) {
-      shifted.push_back(shift_columns(query, columns));
-    }
+    const Contents shifted = tolerated_shifts(query, shift_tolerance_columns);
     active_kernels().max_overlaps(shifted.front().rows.data(), shifted.size(),
                                   places.front().rows.data(), places.size(), overlaps.data());
     const int query_count = count(query);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
@@ -179,12 +180,21 @@ BinaryContent shift_columns(const BinaryContent& content, int columns) {
   return shifted;
 }
 
+std::vector<BinaryContent> tolerated_shifts(const BinaryContent& content, int tolerance_columns) {
+  std::vector<BinaryContent> shifted;
+  for (int columns = -tolerance_columns; columns <= tolerance_columns; ++columns) {
+    if (columns % 2 != 0 && std::abs(columns) != tolerance_columns) continue;
+    shifted.push_back(shift_columns(content, columns));
+  }
+  return shifted;
+}
+
 double similarity(const BinaryContent& a, const BinaryContent& b, int shift_tolerance_columns) {
   const int larger = std::max(count(a), count(b));
   if (larger == 0) return 0.0;
   int best = 0;
-  for (int columns = -shift_tolerance_columns; columns <= shift_tolerance_columns; ++columns) {
-    best = std::max(best, overlap(shift_columns(a, columns), b));
+  for (const BinaryContent& shifted : tolerated_shifts(a, shift_tolerance_columns)) {
+    best = std::max(best, overlap(shifted, b));
   }
   return static_cast<double>(best) / larger;
 }

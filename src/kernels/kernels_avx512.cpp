@@ -222,7 +222,7 @@ __m512i larger_coarse_sums(const std::uint8_t* queries, const std::uint8_t* grou
 void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
                          const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
                          std::uint16_t* largest) {
-  constexpr std::size_t kQueriesAtOnce = 3;
+  constexpr std::size_t kQueriesAtOnce = 5;  // as many shifts as are tolerated by default
   const CoarseChunks chunks = chunks_of(queries, num_queries);
   for (std::size_t group = 0; group < num_groups; ++group) {
     const std::uint8_t* counts = groups + group * kInterleaved * kCoarseCounts;

@@ -50,13 +50,8 @@ void reaching_queries(const std::uint8_t* queries, const std::uint16_t* among,
                       const std::uint8_t* const* records, std::size_t num_records,
                       const std::uint16_t* least, Reached* reached) {
   constexpr int kQueriesAtOnce = 4;
-  constexpr std::size_t kRecordsAhead = 10;  // lie anywhere, and take some 20 ns each
   for (std::size_t i = 0; i < num_records; i += 2) {
     const std::size_t second = i + 1 < num_records ? i + 1 : i;
-    for (std::size_t n = i + kRecordsAhead; n < num_records && n < i + kRecordsAhead + 2; ++n) {
-      __builtin_prefetch(records[n]);
-      __builtin_prefetch(records[n] + kPackedBytes / 2);
-    }
     const Pair pair(records[i], records[second]);
     const __m128i need =
         _mm_unpacklo_epi64(_mm_set1_epi16(static_cast<std::int16_t>(least[i])),

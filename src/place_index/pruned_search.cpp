@@ -26,10 +26,14 @@ constexpr std::size_t kAhead = 4;
 
 constexpr std::size_t kFinestPlaces = kStretchPlaces[kFinestLevel];
 
+/// What is asked for lies anywhere, and takes a hundred times as long as an instruction.
 void prefetch(const void* begin, std::size_t size_bytes) {
   constexpr std::size_t kLine_bytes = 64;
+  constexpr int kIntoSecondCache = 2;  // many at once would fill the queue of the first
   const auto* bytes = static_cast<const char*>(begin);
-  for (std::size_t at = 0; at < size_bytes; at += kLine_bytes) __builtin_prefetch(bytes + at);
+  for (std::size_t at = 0; at < size_bytes; at += kLine_bytes) {
+    __builtin_prefetch(bytes + at, 0, kIntoSecondCache);
+  }
 }
 
 }  // namespace
@@ -51,16 +55,14 @@ PrunedSearch::PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryCon
 }
 
 void PrunedSearch::prepare_shifts(const BinaryContent& query, int tolerance_columns) {
-  const std::size_t shifts = 2 * static_cast<std::size_t>(tolerance_columns) + 1;
-  shifts_per_group_ = (shifts + kMaxShiftGroups - 1) / kMaxShiftGroups;
-  shifted_.reserve(shifts);
-  for (int columns = -tolerance_columns; columns <= tolerance_columns; ++columns) {
-    if (shifted_.size() % shifts_per_group_ == 0) {
+  shifted_ = tolerated_shifts(query, tolerance_columns);
+  shifts_per_group_ = (shifted_.size() + kMaxShiftGroups - 1) / kMaxShiftGroups;
+  for (std::size_t shift = 0; shift < shifted_.size(); ++shift) {
+    if (shift % shifts_per_group_ == 0) {
       group_counts_.emplace_back();
       coarse_counts_.emplace_back();
     }
-    shifted_.push_back(shift_columns(query, columns));
-    const BlockCounts counts = block_counts(shifted_.back());
+    const BlockCounts counts = block_counts(shifted_[shift]);
     raise(group_counts_.back(), counts);
     raise(coarse_counts_.back(), coarse_counts(counts));
   }
@@ -185,6 +187,7 @@ void PrunedSearch::add_to_run(std::size_t level, std::size_t first, std::size_t 
     const std::uint16_t larger = larger_count(smallest[i]);
     run_.numbers[at] = static_cast<std::uint32_t>(first + i);
     run_.maxima[at] = maxima[i].of.data();
+    prefetch(run_.maxima[at], kPackedBytes);
     run_.larger_counts[at] = larger;
     run_.least_sums[at] = static_cast<std::uint16_t>(std::max(1, found_.least_overlap(larger)));
     run_.shifts[at / 2] = shifts;

@@ -38,10 +38,8 @@ SimilarityMatrix similarity_matrix(const std::vector<BinaryContent>& contents,
 
   std::vector<std::uint16_t> overlaps(compared.size());
   for (std::size_t later = 1; later < compared.size(); ++later) {
-    std::vector<BinaryContent> shifted;
-    for (int columns = -shift_tolerance_columns; columns <= shift_tolerance_columns; ++columns) {
-      shifted.push_back(shift_columns(compared[later], columns));
-    }
+    const std::vector<BinaryContent> shifted =
+        tolerated_shifts(compared[later], shift_tolerance_columns);
     active_kernels().max_overlaps(shifted.front().rows.data(), shifted.size(),
                                   compared.front().rows.data(), later, overlaps.data());
     const int row = static_cast<int>(later) * step / matrix.frames_per_cell;

@@ -187,12 +187,12 @@ export function evidenceAt(place, other) {
   };
 }
 
-/** xi with shift tolerance, bit by bit: the plain meaning of the equation. */
+/** xi with an even shift tolerance, bit by bit: the plain meaning of the equation. */
 export function similarity(a, b, tolerance) {
   const count = (bits) => bits.reduce((sum, bit) => sum + bit, 0);
   const larger = Math.max(count(a), count(b));
   let best = 0;
-  for (let shift = -tolerance; shift <= tolerance; ++shift) {
+  for (let shift = -tolerance; shift <= tolerance; shift += 2) {
     let both = 0;
     for (let y = 0; y < kSide; ++y) {
       for (let x = Math.max(0, -shift); x < Math.min(kSide, kSide - shift); ++x) {

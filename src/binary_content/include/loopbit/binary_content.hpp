@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstdint>
 #include <tuple>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -34,9 +35,15 @@ struct BinaryContent {
 /// The content moved `columns` to the right (left if negative); what leaves the map is lost.
 [[nodiscard]] BinaryContent shift_columns(const BinaryContent& content, int columns);
 
+/// The content at the shifts that a tolerance of 0 or more columns stands for, from left to right:
+/// by even numbers of columns up to it, and by the tolerance itself, either way. A content is
+/// blurred (BinaryContentOptions), so that shifts by one column more would tell little more.
+[[nodiscard]] std::vector<BinaryContent> tolerated_shifts(const BinaryContent& content,
+                                                          int tolerance_columns);
+
 /// xi(O1, O2) = |O1 & O2| / max(|O1|, |O2|), in [0, 1]; 0 if either is empty. With a shift
-/// tolerance, the largest over all shifts of `a` by up to so many columns; |O1| is counted before
-/// shifting. Wang et al. 2019, section III-B.
+/// tolerance, the largest over the tolerated shifts of `a`; |O1| is counted before shifting. Wang
+/// et al. 2019, section III-B.
 [[nodiscard]] double similarity(const BinaryContent& a, const BinaryContent& b,
                                 int shift_tolerance_columns = 0);
 

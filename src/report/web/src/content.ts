@@ -42,11 +42,12 @@ export interface Overlap {
   moved: Content;
 }
 
-/** Wang et al. 2019, section III-B; |A| is counted before shifting. */
+/** Wang et al. 2019, section III-B; |A| is counted before shifting, by even numbers of columns and by the tolerance. */
 export function overlapOf(a: Content, b: Content, tolerance: number): Overlap {
   const larger = Math.max(countOf(a), countOf(b));
   let best: Overlap = { similarity: 0, both: -1, larger, shift: 0, moved: a };
   for (let size = 0; size <= tolerance; ++size) {
+    if (size % 2 !== 0 && size !== tolerance) continue;
     for (const shift of size === 0 ? [0] : [-size, size]) {
       const moved = shifted(a, shift);
       let both = 0;
