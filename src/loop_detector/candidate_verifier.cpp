@@ -31,7 +31,7 @@ CandidateVerifier::CandidateVerifier(const LoopDetectorOptions& options, Places 
 std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
                                                          const std::vector<Candidate>& candidates) {
   promising_.clear();
-  is_promising_.assign(query.features.keypoints.size(), false);
+  promising_features_.clear();
   sightings_.clear();
   std::vector<VerifiedCandidate> verified = unverified(candidates);
   const std::vector<std::size_t> order = first_look(query, verified, verifications_);
@@ -201,13 +201,10 @@ void CandidateVerifier::note_promising(const VerifiedCandidate& candidate,
                                        const Verification& result) {
   if (candidate.evidence() <= options_.decision.chance_evidence) return;
   promising_.push_back(spot_of(candidate));
-  for (const Match& inlier : result.inliers) {
-    is_promising_[static_cast<std::size_t>(inlier.query)] = true;
-  }
-  promising_features_.clear();
-  for (std::size_t i = 0; i < is_promising_.size(); ++i) {
-    if (is_promising_[i]) promising_features_.push_back(static_cast<int>(i));
-  }
+  std::vector<int>& features = promising_features_;
+  for (const Match& inlier : result.inliers) features.push_back(inlier.query);
+  std::sort(features.begin(), features.end());
+  features.erase(std::unique(features.begin(), features.end()), features.end());
 }
 
 Spot CandidateVerifier::spot_of(const VerifiedCandidate& candidate) const {
@@ -224,7 +221,7 @@ bool CandidateVerifier::is_elsewhere(const VerifiedCandidate& candidate) const {
 /// Of `matches`, those whose feature of the query is an inlier of a promising candidate.
 std::size_t CandidateVerifier::num_shared(const std::vector<Match>& matches) const {
   const auto shared = std::count_if(matches.begin(), matches.end(), [&](const Match& match) {
-    return is_promising_[static_cast<std::size_t>(match.query)];
+    return std::binary_search(promising_features_.begin(), promising_features_.end(), match.query);
   });
   return static_cast<std::size_t>(shared);
 }

@@ -83,8 +83,7 @@ class CandidateVerifier {
   std::vector<Verification> beside_;         ///< first looks at the places beside one of them
   Verification verification_;                ///< of one such place
   std::vector<Spot> promising_;              ///< where promising candidates stand
-  std::vector<bool> is_promising_;           ///< by feature of the query: it is an inlier of one
-  std::vector<int> promising_features_;      ///< the same as a list
+  std::vector<int> promising_features_;      ///< of the query: inliers of one of them, in order
   std::vector<Sighting> sightings_;          ///< none if no candidate is promising
 };
 
