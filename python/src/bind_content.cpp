@@ -143,8 +143,8 @@ void bind_comparison(py::module_& module) {
              "The content moved so many columns to the right (left if negative).");
   module.def("similarity", &similarity, py::arg("a"), py::arg("b"),
              py::arg("shift_tolerance_columns") = 0,
-             "xi(a, b) = |a & b| / max(|a|, |b|), in [0, 1], the largest over the tolerated "
-             "shifts; Wang et al. 2019, section III-B.");
+             "xi(a, b) = |a & b| / max(|a|, |b|), in [0, 1], the largest over shifts of a by even "
+             "numbers of columns up to the tolerance, and by it; Wang et al. 2019, section III-B.");
   module.def("similarity_matrix", &similarity_matrix, py::arg("queries"),
              py::arg("places") = py::none(), py::arg("shift_tolerance_columns") = 0,
              "similarity() of every query (row) with every place (column), float64; without "

@@ -36,8 +36,8 @@ struct BinaryContent {
 [[nodiscard]] BinaryContent shift_columns(const BinaryContent& content, int columns);
 
 /// The content at the shifts that a tolerance of 0 or more columns stands for, from left to right:
-/// by even numbers of columns up to it, and by the tolerance itself, either way. A content is
-/// blurred (BinaryContentOptions), so that shifts by one column more would tell little more.
+/// by even numbers of columns up to it, and by the tolerance itself, either way. Contents are
+/// blurred: moved by a single column, one still has a xi of 0.9 with itself.
 [[nodiscard]] std::vector<BinaryContent> tolerated_shifts(const BinaryContent& content,
                                                           int tolerance_columns);
 
