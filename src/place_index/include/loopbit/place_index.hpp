@@ -42,9 +42,8 @@ struct RetrievalOptions {
         Field{"max_candidates", &S::max_candidates, 1, 1000, "look-alike places that are verified"},
         Field{"min_similarity", &S::min_similarity, 0.0, 1.0,
               "smallest similarity xi of a candidate; 0 takes every place that shares a pixel"},
-        Field{
-            "shift_tolerance_columns", &S::shift_tolerance_columns, 0, 32,
-            "contents are compared shifted sideways by up to so many of their 64 columns, in twos"},
+        Field{"shift_tolerance_columns", &S::shift_tolerance_columns, 0, 32,
+              "contents are compared shifted by up to so many of 64 columns, in steps of 2"},
         Field{"min_spacing", &S::min_spacing, 1, 1000,
               "candidates are at least so many places apart"},
         Field{"max_count_difference", &S::max_count_difference, 0, 4096,
