@@ -44,11 +44,11 @@ void bm_binary_content(benchmark::State& state) {
 }
 BENCHMARK(bm_binary_content)->Unit(benchmark::kMicrosecond);
 
-/// A full scan with nine shifts, by each kernel this processor runs.
+/// A full scan with five shifts, by each kernel this processor runs.
 void bm_max_overlaps(benchmark::State& state) {
   const Kernels& kernels = *available_kernels()[static_cast<std::size_t>(state.range(0))];
   constexpr std::size_t kPlaces = 10'000;
-  constexpr std::size_t kShifts = 9;
+  constexpr std::size_t kShifts = 5;
   const auto contents = drive(kPlaces);
   std::vector<std::uint16_t> overlaps(kPlaces);
   for (auto _ : state) {
