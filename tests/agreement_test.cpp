@@ -171,20 +171,30 @@ TEST(Agreement, FollowsNoWayThatIsNotGoneOn) {
 
 TEST(InlierWorth, GrowsWithTheShareUpToTheFullOne) {
   const DecisionOptions options{.full_share = 0.2};
-  EXPECT_DOUBLE_EQ(inlier_worth(0.0, 1000, options), 0);
-  EXPECT_DOUBLE_EQ(inlier_worth(0.05, 1000, options), 0.5);
-  EXPECT_DOUBLE_EQ(inlier_worth(0.2, 1000, options), 1);
-  EXPECT_DOUBLE_EQ(inlier_worth(0.9, 1000, options), 1);
-  EXPECT_DOUBLE_EQ(inlier_worth(0.0, 1000, {.full_share = 0}), 1) << "switched off";
+  EXPECT_DOUBLE_EQ(inlier_worth(0.0, {1000}, options), 0);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.05, {1000}, options), 0.5);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.2, {1000}, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.9, {1000}, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.0, {1000}, {.full_share = 0}), 1) << "switched off";
+}
+
+TEST(InlierWorth, FallsWithWhatTheViewSharesWithTheStepBefore) {
+  const DecisionOptions options{.full_view_inliers = 30};
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {1000, 0}, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {1000, 30}, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {1000, 40}, options), 0.75);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {1000, 60}, options), 0.5);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {1000, 120}, options), 0.5);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {1000, 600}, {.full_view_inliers = 600}), 1) << "switched off";
 }
 
 TEST(InlierWorth, GrowsWithTheMapUpToTheFullOne) {
   const DecisionOptions options{.full_steps = 99};
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 0, options), 0);
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 9, options), 0.5);
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 99, options), 1);
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 100'000, options), 1);
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 1, {.full_steps = 1}), 1) << "switched off";
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {0}, options), 0);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {9}, options), 0.5);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {99}, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {100'000}, options), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(1, {1}, {.full_steps = 1}), 1) << "switched off";
 }
 
 }  // namespace

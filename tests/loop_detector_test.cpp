@@ -296,6 +296,23 @@ TEST(LoopDetector, EvidenceCountsLessWhileTheMapIsSmall) {
   EXPECT_EQ(score_in_a_map_of(25), score_in_a_map_of(30));
 }
 
+TEST(LoopDetector, EvidenceCountsLessWhereTheViewSharesMuchWithTheStepBefore) {
+  LoopDetectorOptions options = short_window_options();
+  options.decision.agreement_weight = 0;
+  const auto score_after = [&](const cv::Mat1b& step_before) {
+    LoopDetector detector = after_places(1, 20, options);
+    detector.process(step_before);
+    return detector.query(again(1)).score;
+  };
+  const cv::Mat1b elsewhere = view(30);
+  const cv::Mat1b beside = view(1, {40, 16});
+  const double full = score_after(elsewhere);
+  EXPECT_GT(full, options.decision.min_score);
+  options.decision.full_view_inliers = 10;
+  EXPECT_EQ(score_after(elsewhere), full);
+  EXPECT_DOUBLE_EQ(score_after(beside), full / 2) << "but never less than half";
+}
+
 // Places that look alike
 
 /// A picture of `scene` with the left half of `common`.

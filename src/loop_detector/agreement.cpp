@@ -15,18 +15,26 @@ namespace {
 /// revisits may be slower or faster than the first visit, and candidates are only so finely spaced.
 constexpr std::ptrdiff_t kMaxStepsPerStep = 3;
 
+/// An inlier counts at least so much, however much a view shares with the one before: a camera that
+/// hovers sees nearly all of it again.
+constexpr double kMinWorthInRichView = 0.5;
+
 /// With less support a way is not followed.
 constexpr double kMinFollowedSupport = 1.0;
 
 }  // namespace
 
-double inlier_worth(double explained_share, std::ptrdiff_t earlier_steps,
+double inlier_worth(double explained_share, const FrameContext& frame,
                     const DecisionOptions& options) {
   if (options.count_matches) return 1;
   double worth = 1;
   if (explained_share < options.full_share) worth = std::sqrt(explained_share / options.full_share);
-  if (earlier_steps < options.full_steps) {
-    worth *= std::log1p(static_cast<double>(earlier_steps)) / std::log1p(options.full_steps);
+  if (frame.earlier_steps < options.full_steps) {
+    worth *= std::log1p(static_cast<double>(frame.earlier_steps)) / std::log1p(options.full_steps);
+  }
+  if (frame.view_inliers > options.full_view_inliers) {
+    worth *= std::max(kMinWorthInRichView,
+                      static_cast<double>(options.full_view_inliers) / frame.view_inliers);
   }
   return worth;
 }

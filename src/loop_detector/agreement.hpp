@@ -24,10 +24,19 @@ struct VerifiedCandidate {
   [[nodiscard]] double evidence() const { return distinct_inliers * inlier_worth * distinctness; }
 };
 
-/// What one distinct inlier counts, 0 to 1. `explained_share`: see there. `earlier_steps`: changes
-/// of view that the map holds: how rare a thing is can be known no better than by one in so many,
-/// so that evidence counts less while a map is small. 1 where mere matches are counted.
-double inlier_worth(double explained_share, std::ptrdiff_t earlier_steps,
+/// What is known of a frame whatever place it is compared with.
+struct FrameContext {
+  /// Changes of view that the map holds: how rare a thing is can be known no better than by one in
+  /// so many, so that evidence counts less while a map is small.
+  std::ptrdiff_t earlier_steps = 0;
+  /// Distinct inliers that its view shares with the change of view before. That is what can be
+  /// recognised of it: the same number found elsewhere says less of a view that has more.
+  int view_inliers = 0;
+};
+
+/// What one distinct inlier counts, 0 to 1. `explained_share`: see there. 1 where mere matches are
+/// counted.
+double inlier_worth(double explained_share, const FrameContext& frame,
                     const DecisionOptions& options);
 
 /// Agreement over time: a robot that revisits keeps revisiting, so the steps just before the query

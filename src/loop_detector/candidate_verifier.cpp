@@ -101,7 +101,8 @@ std::vector<std::size_t> CandidateVerifier::first_look(
     VerifiedCandidate expected = verified[i];
     verifier_.match_strongest(query.features, places_.features(expected.candidate.place), looks[i]);
     expected.distinct_inliers = static_cast<int>(looks[i].matches.size());
-    expected.inlier_worth = std::max(1.0, keypoints / looked_at);
+    expected.inlier_worth =
+        std::max(1.0, keypoints / looked_at) * inlier_worth(1.0, query.context, options_.decision);
     scores.emplace_back(-agreement_.score(expected, query.is_step), i);
   }
   std::sort(scores.begin(), scores.end());
@@ -144,14 +145,14 @@ void CandidateVerifier::find_geometry(const Query& query, VerifiedCandidate& can
   verifier_.find_geometry(query.features, places_.features(candidate.candidate.place), result);
   candidate.inliers = static_cast<int>(result.inliers.size());
   candidate.distinct_inliers = result.distinct_inliers;
-  candidate.inlier_worth = inlier_worth(result.explained_share, query.earlier_steps, decision);
+  candidate.inlier_worth = inlier_worth(result.explained_share, query.context, decision);
 }
 
 /// The score if all matches were distinct inliers that explain all around them: no geometry can
 /// lead to a higher one.
 double CandidateVerifier::highest_score(const Query& query, VerifiedCandidate candidate) const {
   candidate.distinct_inliers = candidate.matches;
-  candidate.inlier_worth = inlier_worth(1.0, query.earlier_steps, options_.decision);
+  candidate.inlier_worth = inlier_worth(1.0, query.context, options_.decision);
   return agreement_.score(candidate, query.is_step);
 }
 

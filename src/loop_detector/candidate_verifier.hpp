@@ -24,8 +24,8 @@ class CandidateVerifier {
  public:
   struct Query {
     const Features& features;
-    bool is_step = true;               ///< it changes the view, see Agreement::score
-    std::ptrdiff_t earlier_steps = 0;  ///< see inlier_worth()
+    bool is_step = true;  ///< it changes the view, see Agreement::score
+    FrameContext context;
   };
 
   /// What is known of places.

@@ -110,7 +110,8 @@ class LoopDetector::Impl {
     BinaryContent content;
     Features features;
     RecentView::Look look;
-    std::ptrdiff_t earlier_steps = 0;  ///< that may be candidates
+    FrameContext context;
+    PlaceId compared = -1;  ///< the recent place that verification_ compares it with
     std::vector<VerifiedCandidate> verified;
     std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
   };
@@ -134,7 +135,7 @@ class LoopDetector::Impl {
     detection.times.features_ms = stopwatch.lap_ms();
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, timestamp_s);
-    seen.earlier_steps = steps_before(end);
+    seen.context = {steps_before(end), view_inliers(seen)};
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
@@ -188,6 +189,7 @@ class LoopDetector::Impl {
   void remember(Observation seen, const Detection& detection, const cv::Mat& image) {
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
+    latest_view_inliers_ = seen.context.view_inliers;
     if (detection.status == Status::loop) {
       known_loops_.add(recent_view_.step_of(place), seen.best->step);
     }
@@ -255,22 +257,38 @@ class LoopDetector::Impl {
   }
 
   static CandidateVerifier::Query verified_query(const Observation& seen) {
-    return {seen.features, seen.look.is_step, seen.earlier_steps};
+    return {seen.features, seen.look.is_step, seen.context};
   }
 
   /// How far back the view of a new frame reaches.
-  [[nodiscard]] RecentView::Look look(const Observation& seen) const {
+  [[nodiscard]] RecentView::Look look(Observation& seen) const {
     const bool is_step =
         recent_view_.empty() ||
         similarity(seen.content, index_.content(recent_view_.latest_step())) < kUnmovedSimilarity;
     return recent_view_.look(index_.size(), is_step, [&](PlaceId place) {
       if (is_window_fixed()) return true;
+      const Verification& shared = compare(seen, place);
+      return moved_inliers(seen.features, features(place), shared.inliers) >=
+             options_.exclusion.in_view_inliers;
+    });
+  }
+
+  /// See FrameContext. A frame that shows the same as the last step can recognise as much.
+  [[nodiscard]] int view_inliers(Observation& seen) const {
+    if (options_.decision.count_matches || recent_view_.empty()) return 0;
+    if (!seen.look.is_step) return latest_view_inliers_;
+    return compare(seen, recent_view_.latest_step()).distinct_inliers;
+  }
+
+  /// What a frame shares with a recent place.
+  const Verification& compare(Observation& seen, PlaceId place) const {
+    if (seen.compared != place) {
       const Features& recent = features(place);
       verifier_.match(seen.features, recent, verification_);
       verifier_.find_geometry(seen.features, recent, verification_);
-      return moved_inliers(seen.features, recent, verification_.inliers) >=
-             options_.exclusion.in_view_inliers;
-    });
+      seen.compared = place;
+    }
+    return verification_;
   }
 
   [[nodiscard]] bool is_window_fixed() const {
@@ -380,6 +398,7 @@ class LoopDetector::Impl {
   PlaceMemory memory_;
   std::vector<double> times_s_;  ///< of each frame of this session; 0 where there is none
   RecentView recent_view_;
+  int latest_view_inliers_ = 0;  ///< see FrameContext
   Agreement agreement_;
   KnownLoops known_loops_;
   // Working memory, which makes const functions unfit for threads.

@@ -42,11 +42,12 @@ struct ExclusionOptions {
 
 /// The one rule that accepts a match: score >= min_score.
 struct DecisionOptions {
-  double min_score = 21.0;
+  double min_score = 16.0;
   double full_share = 0.1;
   int full_steps = 200;
+  int full_view_inliers = 40;
   bool distinctness = true;
-  double chance_evidence = 10.0;
+  double chance_evidence = 6.0;
   double agreement_weight = 0.4;
   double agreement_memory = 0.8;
   int followed_ways = 3;
@@ -63,6 +64,9 @@ struct DecisionOptions {
         Field{"full_steps", &S::full_steps, 1, 1'000'000,
               "inliers count in full once the map holds so many changes of view, and before by its "
               "logarithm; 1 = always"},
+        Field{"full_view_inliers", &S::full_view_inliers, 1, 1'000'000,
+              "inliers count in full where a view shares no more distinct ones with the change of "
+              "view before, and by so much less, though at least by half, where it shares more"},
         switch_field("distinctness", &S::distinctness,
                      "an inlier counts less if other places have it, too"),
         Field{"chance_evidence", &S::chance_evidence, 0.0, 1000.0,
