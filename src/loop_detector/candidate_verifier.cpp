@@ -95,14 +95,15 @@ std::vector<std::size_t> CandidateVerifier::first_look(
   looks.resize(std::max(looks.size(), verified.size()));
   const auto keypoints = static_cast<double>(query.features.keypoints.size());
   const double looked_at = options_.verification.first_look_keypoints;
+  const double worth =
+      std::max(1.0, keypoints / looked_at) * inlier_worth(1.0, query.context, options_.decision);
   std::vector<std::pair<double, std::size_t>> scores;
   scores.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
     VerifiedCandidate expected = verified[i];
     verifier_.match_strongest(query.features, places_.features(expected.candidate.place), looks[i]);
     expected.distinct_inliers = static_cast<int>(looks[i].matches.size());
-    expected.inlier_worth =
-        std::max(1.0, keypoints / looked_at) * inlier_worth(1.0, query.context, options_.decision);
+    expected.inlier_worth = worth;
     scores.emplace_back(-agreement_.score(expected, query.is_step), i);
   }
   std::sort(scores.begin(), scores.end());
