@@ -3,6 +3,8 @@
 #include "candidate_verifier.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <iterator>
 #include <tuple>
 #include <utility>
 
@@ -17,6 +19,10 @@ constexpr std::size_t kMinSharedMatches = 4;
 constexpr std::size_t kMinSharedAtFirst = 1;
 /// Of the places beside a candidate, so many are looked at closer.
 constexpr std::size_t kMaxBeside = 4;
+/// So many of the strongest keypoints tell which of the places beside each other is the nearest.
+constexpr std::size_t kKeypointsToLocate = 300;
+/// The nearest place shows at least this part of the distinct inliers that one beside it has.
+constexpr double kMinPartOfInliers = 0.7;
 
 }  // namespace
 
@@ -49,12 +55,13 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
 
 VerifiedCandidate CandidateVerifier::closest(const Query& query, const VerifiedCandidate& candidate,
                                              const std::vector<VerifiedCandidate>& verified,
-                                             const std::vector<Candidate>& beside) {
+                                             std::vector<Candidate> around) {
   const auto closeness = [](const VerifiedCandidate& v) {
     return std::tuple(v.distinct_inliers, v.inliers, v.candidate.similarity);
   };
   VerifiedCandidate best = candidate;
-  std::vector<VerifiedCandidate> neighbours = unverified(beside);
+  std::erase_if(around, [&](const Candidate& c) { return c.place == candidate.candidate.place; });
+  std::vector<VerifiedCandidate> neighbours = unverified(around);
   std::vector<std::size_t> order = first_look(query, neighbours, beside_);
   order.resize(std::min(order.size(), kMaxBeside));
   for (const std::size_t i : order) {
@@ -67,6 +74,65 @@ VerifiedCandidate CandidateVerifier::closest(const Query& query, const VerifiedC
     best = neighbour;
   }
   return best;
+}
+
+VerifiedCandidate CandidateVerifier::located(const Query& query, const VerifiedCandidate& candidate,
+                                             const std::vector<Candidate>& around) {
+  const std::vector<double> shared = shared_around(query, around);
+  const PlaceId first = around.front().place;
+  const auto shared_at = [&](PlaceId place) {
+    return shared[static_cast<std::size_t>(place - first)];
+  };
+  const PlaceId middle = candidate.candidate.place;
+  std::vector<Candidate> nearer;
+  for (const Candidate& c : around) {
+    if (std::abs(c.place - middle) > options_.retrieval.min_spacing) continue;
+    if (shared_at(c.place) > shared_at(middle)) nearer.push_back(c);
+  }
+  std::stable_sort(nearer.begin(), nearer.end(), [&](const Candidate& a, const Candidate& b) {
+    return shared_at(a.place) > shared_at(b.place);
+  });
+  const double enough = kMinPartOfInliers * candidate.distinct_inliers;
+  for (VerifiedCandidate& place : unverified(nearer)) {
+    match(query, place, verification_);
+    if (place.matches < enough) continue;
+    find_geometry(query, place, verification_);
+    if (place.distinct_inliers < enough) continue;
+    VerifiedCandidate nearest = candidate;
+    nearest.candidate = place.candidate;
+    nearest.matches = place.matches;
+    nearest.inliers = place.inliers;
+    return nearest;
+  }
+  return candidate;
+}
+
+/// For each place, its matches averaged with those of the places beside it, at falling weight. One
+/// place may have more matches than the next by chance, but what is in view is so from all of them.
+std::vector<double> CandidateVerifier::shared_around(const Query& query,
+                                                     const std::vector<Candidate>& around) {
+  std::vector<int> matches;
+  matches.reserve(around.size());
+  for (const Candidate& c : around) {
+    verifier_.match_strongest(query.features, places_.features(c.place), kKeypointsToLocate,
+                              verification_);
+    matches.push_back(static_cast<int>(verification_.matches.size()));
+  }
+  std::vector<double> shared;
+  shared.reserve(matches.size());
+  for (std::ptrdiff_t middle = 0; middle < std::ssize(matches); ++middle) {
+    const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, middle - kReach);
+    const std::ptrdiff_t last = std::min(std::ssize(matches) - 1, middle + kReach);
+    std::ptrdiff_t sum = 0;
+    std::ptrdiff_t weights = 0;
+    for (std::ptrdiff_t i = first; i <= last; ++i) {
+      const std::ptrdiff_t weight = kReach + 1 - std::abs(i - middle);
+      sum += weight * matches[static_cast<std::size_t>(i)];
+      weights += weight;
+    }
+    shared.push_back(static_cast<double>(sum) / static_cast<double>(weights));
+  }
+  return shared;
 }
 
 void CandidateVerifier::complete(const Query& query, std::vector<VerifiedCandidate>& verified) {
@@ -101,7 +167,9 @@ std::vector<std::size_t> CandidateVerifier::first_look(
   scores.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
     VerifiedCandidate expected = verified[i];
-    verifier_.match_strongest(query.features, places_.features(expected.candidate.place), looks[i]);
+    verifier_.match_strongest(query.features, places_.features(expected.candidate.place),
+                              static_cast<std::size_t>(options_.verification.first_look_keypoints),
+                              looks[i]);
     expected.distinct_inliers = static_cast<int>(looks[i].matches.size());
     expected.inlier_worth = worth;
     scores.emplace_back(-agreement_.score(expected, query.is_step), i);

@@ -44,16 +44,26 @@ class CandidateVerifier {
                                         const std::vector<Candidate>& candidates);
 
   /// The one with most inliers of `candidate`, one of those that verify() returned for this query,
-  /// and of places beside it: all are the same place, or none.
+  /// and of the places `around` it: all are the same place, or none.
   VerifiedCandidate closest(const Query& query, const VerifiedCandidate& candidate,
                             const std::vector<VerifiedCandidate>& verified,
-                            const std::vector<Candidate>& beside);
+                            std::vector<Candidate> around);
+
+  /// The same evidence, and of the places next to `candidate` the one that is nearest as far as all
+  /// of them tell. `around`: consecutive places, `candidate` among them, kReach beyond those that
+  /// may be the answer on either side, where there are so many.
+  VerifiedCandidate located(const Query& query, const VerifiedCandidate& candidate,
+                            const std::vector<Candidate>& around);
+
+  /// How far a place speaks for those beside it.
+  static constexpr int kReach = 2;
 
   /// Verifies in full those that verify() left out.
   void complete(const Query& query, std::vector<VerifiedCandidate>& verified);
 
  private:
   [[nodiscard]] Spot spot_of(const VerifiedCandidate& candidate) const;
+  std::vector<double> shared_around(const Query& query, const std::vector<Candidate>& around);
   [[nodiscard]] std::vector<VerifiedCandidate> unverified(
       const std::vector<Candidate>& candidates) const;
   std::vector<std::size_t> first_look(const Query& query,

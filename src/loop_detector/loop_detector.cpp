@@ -309,10 +309,14 @@ class LoopDetector::Impl {
     return std::max(memory_.session_begin(), std::min(first, index_.size() - exclusion.min_frames));
   }
 
-  using Rank = std::tuple<double, int, double>;
+  using Rank = std::tuple<bool, double, int, double>;
 
+  /// Which of several candidates is the place. Agreement over time says that the robot is back; of
+  /// places that are accepted, the one that shows most itself is where.
   [[nodiscard]] Rank rank(const VerifiedCandidate& v, const Observation& seen) const {
-    return std::tuple(agreement_.score(v, seen.look.is_step), v.matches, v.candidate.similarity);
+    const double score = agreement_.score(v, seen.look.is_step);
+    const bool is_accepted = score >= options_.decision.min_score;
+    return {is_accepted, is_accepted ? v.evidence() : score, v.matches, v.candidate.similarity};
   }
 
   [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const {
@@ -320,9 +324,8 @@ class LoopDetector::Impl {
             similarity(content, index_.content(place), options_.retrieval.shift_tolerance_columns)};
   }
 
-  /// The places below `end` that lie no farther from `middle` than candidates stand apart.
-  [[nodiscard]] std::vector<PlaceId> around(PlaceId middle, PlaceId end) const {
-    const int radius = options_.retrieval.min_spacing;
+  /// The places below `end` that lie at most `radius` from `middle`, in order.
+  static std::vector<PlaceId> around(PlaceId middle, int radius, PlaceId end) {
     const PlaceId first = std::max(0, middle - radius);
     const PlaceId last = std::min(end - 1, middle + radius);
     std::vector<PlaceId> places;
@@ -335,7 +338,7 @@ class LoopDetector::Impl {
   void add_expected(const BinaryContent& content, PlaceId end,
                     std::vector<Candidate>& candidates) const {
     for (const PlaceId followed : agreement_.followed_places()) {
-      for (const PlaceId place : around(followed, end)) {
+      for (const PlaceId place : around(followed, options_.retrieval.min_spacing, end)) {
         const bool is_there =
             std::any_of(candidates.begin(), candidates.end(),
                         [&](const Candidate& other) { return other.place == place; });
@@ -347,14 +350,27 @@ class LoopDetector::Impl {
     }
   }
 
-  /// The places around a candidate. Candidates stand apart, so one of these may be the best.
-  [[nodiscard]] std::vector<Candidate> beside(PlaceId middle, PlaceId end,
-                                              const BinaryContent& content) const {
-    std::vector<Candidate> places;
-    for (const PlaceId place : around(middle, end)) {
-      if (place != middle) places.push_back(candidate(place, content));
+  [[nodiscard]] std::vector<Candidate> candidates_around(PlaceId middle, int radius, PlaceId end,
+                                                         const BinaryContent& content) const {
+    std::vector<Candidate> candidates;
+    for (const PlaceId place : around(middle, radius, end)) {
+      candidates.push_back(candidate(place, content));
     }
-    return places;
+    return candidates;
+  }
+
+  /// The best candidate, refined: candidates stand apart, so a place beside it may be the best.
+  [[nodiscard]] VerifiedCandidate refined(const VerifiedCandidate& best, const Observation& seen,
+                                          PlaceId end) const {
+    const CandidateVerifier::Query query = verified_query(seen);
+    const int radius = options_.retrieval.min_spacing;
+    const VerifiedCandidate closest =
+        candidates_.closest(query, best, seen.verified,
+                            candidates_around(best.candidate.place, radius, end, seen.content));
+    return candidates_.located(
+        query, closest,
+        candidates_around(closest.candidate.place, radius + CandidateVerifier::kReach, end,
+                          seen.content));
   }
 
   [[nodiscard]] Status judged(VerifiedCandidate best, const Observation& seen) const {
@@ -376,10 +392,7 @@ class LoopDetector::Impl {
         [&](const auto& a, const auto& b) { return rank(a, seen) < rank(b, seen); });
     // Below, a neighbour is no likelier to be right than any other place.
     const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
-    if (score() > options_.decision.chance_evidence) {
-      best = candidates_.closest(verified_query(seen), best, seen.verified,
-                                 beside(best.candidate.place, end, seen.content));
-    }
+    if (score() > options_.decision.chance_evidence) best = refined(best, seen, end);
     seen.best = best;
     detection.score = score();
     detection.status = judged(best, seen);

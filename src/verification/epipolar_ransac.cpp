@@ -104,13 +104,30 @@ int matrices_of(const EpipolarPencils& pencils, std::size_t lane,
 }
 
 /// The nearest matrix of rank two: without the part along the right singular vector of the smallest
-/// singular value.
+/// singular value. The adjugate of f^T f has the same vectors and that one's value is by far its
+/// largest, so powers of it lead there at once.
 cv::Matx33d rank_two(const cv::Matx33d& f) {
-  cv::Matx31d values;
-  cv::Matx33d vectors;
-  cv::eigen(f.t() * f, values, vectors);
-  const cv::Matx31d smallest = vectors.row(2).t();
-  return f - f * smallest * smallest.t();
+  const cv::Matx33d squares = f.t() * f;
+  const std::array<cv::Vec3d, 3> rows{cv::Vec3d(squares.val), cv::Vec3d(squares.val + 3),
+                                      cv::Vec3d(squares.val + 6)};
+  const std::array<cv::Vec3d, 3> adjugate{rows[1].cross(rows[2]), rows[2].cross(rows[0]),
+                                          rows[0].cross(rows[1])};
+  std::size_t start = 0;
+  for (std::size_t i = 1; i < 3; ++i) {
+    const auto diagonal = [&](std::size_t k) { return adjugate[k][static_cast<int>(k)]; };
+    if (diagonal(i) > diagonal(start)) start = i;
+  }
+  cv::Vec3d smallest = adjugate[start];
+  constexpr int kIterations = 4;
+  for (int i = 0; i < kIterations; ++i) {
+    const double size = cv::norm(smallest);
+    if (size == 0) return f;  // its rank is one already
+    smallest *= 1 / size;
+    smallest = {adjugate[0].dot(smallest), adjugate[1].dot(smallest), adjugate[2].dot(smallest)};
+  }
+  smallest = cv::normalize(smallest);
+  const cv::Matx31d along(smallest.val);
+  return f - f * along * along.t();
 }
 
 /// Samples that suffice to draw one of inliers only with the confidence.
@@ -162,21 +179,43 @@ EpipolarScore EpipolarRansac::score(const cv::Matx33d& model) {
   return kernels_.epipolar_score(elements.data(), pairs_, max_error_sq_, is_inlier_.data());
 }
 
-/// The matrix that fits all inliers best, by the eight-point algorithm. What minimizes the sum of
-/// squares is the eigenvector of the smallest eigenvalue; inverse iteration finds it from the best
-/// model so far, without the other eight.
-cv::Matx33d EpipolarRansac::fit() const {
-  using Vector = cv::Matx<double, 9, 1>;
-  cv::Matx<double, 9, 9> squares = cv::Matx<double, 9, 9>::zeros();
+/// The sum over the inliers of r r^T, where r = (x1, y1, 1) times (x0, y0, 1), each element with
+/// each: its 81 elements are but 36 different sums.
+cv::Matx<double, 9, 9> EpipolarRansac::sum_of_squares() const {
+  constexpr std::size_t kProducts = 6;
+  constexpr std::array<std::array<std::size_t, 3>, 3> kProduct{{{0, 1, 2}, {1, 3, 4}, {2, 4, 5}}};
+  std::array<double, kProducts * kProducts> sums{};
   for (std::size_t k = 0; k < pairs_.count; ++k) {
     if (is_inlier_[k] == 0) continue;
     const double x0 = pairs_.x0[k];
     const double y0 = pairs_.y0[k];
     const double x1 = pairs_.x1[k];
     const double y1 = pairs_.y1[k];
-    const Vector row(x1 * x0, x1 * y0, x1, y1 * x0, y1 * y0, y1, x0, y0, 1.0);
-    squares += row * row.t();
+    const std::array<double, kProducts> of_first{x0 * x0, x0 * y0, x0, y0 * y0, y0, 1.0};
+    const std::array<double, kProducts> of_second{x1 * x1, x1 * y1, x1, y1 * y1, y1, 1.0};
+    for (std::size_t i = 0; i < kProducts; ++i) {
+      for (std::size_t j = 0; j < kProducts; ++j) {
+        sums[i * kProducts + j] += of_second[i] * of_first[j];
+      }
+    }
   }
+  cv::Matx<double, 9, 9> squares;
+  for (std::size_t row = 0; row < 9; ++row) {
+    for (std::size_t column = 0; column < 9; ++column) {
+      const std::size_t second = kProduct[row / 3][column / 3];
+      const std::size_t first = kProduct[row % 3][column % 3];
+      squares.val[row * 9 + column] = sums[second * kProducts + first];
+    }
+  }
+  return squares;
+}
+
+/// The matrix that fits all inliers best, by the eight-point algorithm. What minimizes the sum of
+/// squares is the eigenvector of the smallest eigenvalue; inverse iteration finds it from the best
+/// model so far, without the other eight.
+cv::Matx33d EpipolarRansac::fit() const {
+  using Vector = cv::Matx<double, 9, 1>;
+  cv::Matx<double, 9, 9> squares = sum_of_squares();
   // Where the inliers agree exactly there is no inverse without a little on the diagonal.
   constexpr double kRelativeShift = 1e-12;
   const double shift = kRelativeShift * cv::trace(squares);

@@ -42,6 +42,7 @@ class EpipolarRansac {
   void normalize(std::span<const Pair> pairs, double max_error_px);
   [[nodiscard]] EpipolarScore score(const cv::Matx33d& model);
   void offer(const cv::Matx33d& model);
+  [[nodiscard]] cv::Matx<double, 9, 9> sum_of_squares() const;
   [[nodiscard]] cv::Matx33d fit() const;
   void refit();
 
