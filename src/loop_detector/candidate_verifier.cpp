@@ -77,6 +77,7 @@ VerifiedCandidate CandidateVerifier::closest(const Query& query, const VerifiedC
 }
 
 VerifiedCandidate CandidateVerifier::located(const Query& query, const VerifiedCandidate& candidate,
+                                             const std::vector<VerifiedCandidate>& verified,
                                              const std::vector<Candidate>& around) {
   const std::vector<double> shared = shared_around(query, around);
   const PlaceId first = around.front().place;
@@ -94,9 +95,9 @@ VerifiedCandidate CandidateVerifier::located(const Query& query, const VerifiedC
   });
   const double enough = kMinPartOfInliers * candidate.distinct_inliers;
   for (VerifiedCandidate& place : unverified(nearer)) {
-    match(query, place, verification_);
+    Verification& result = match_once(query, verified, place);
     if (place.matches < enough) continue;
-    find_geometry(query, place, verification_);
+    if (place.inliers == 0) find_geometry(query, place, result);
     if (place.distinct_inliers < enough) continue;
     VerifiedCandidate nearest = candidate;
     nearest.candidate = place.candidate;

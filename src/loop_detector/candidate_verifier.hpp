@@ -53,6 +53,7 @@ class CandidateVerifier {
   /// of them tell. `around`: consecutive places, `candidate` among them, kReach beyond those that
   /// may be the answer on either side, where there are so many.
   VerifiedCandidate located(const Query& query, const VerifiedCandidate& candidate,
+                            const std::vector<VerifiedCandidate>& verified,
                             const std::vector<Candidate>& around);
 
   /// How far a place speaks for those beside it.

@@ -163,17 +163,18 @@ class LoopDetector::Impl {
     return evidence;
   }
 
-  /// How each candidate scored, in the order in which decide() ranks them.
+  /// How each candidate scored: the answer, and then the others in the order of their rank.
   [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen) const {
     candidates_.complete(verified_query(seen), seen.verified);
     if (seen.best) {
       std::erase_if(seen.verified, [&](const VerifiedCandidate& v) {
         return v.candidate.place == seen.best->candidate.place;
       });
-      seen.verified.push_back(*seen.best);
     }
     std::stable_sort(seen.verified.begin(), seen.verified.end(),
                      [&](const auto& a, const auto& b) { return rank(a, seen) > rank(b, seen); });
+    // First, whatever those that were left out turn out to have.
+    if (seen.best) seen.verified.insert(seen.verified.begin(), *seen.best);
     std::vector<RankedPlace> places;
     places.reserve(seen.verified.size());
     for (const VerifiedCandidate& v : seen.verified) {
@@ -368,7 +369,7 @@ class LoopDetector::Impl {
         candidates_.closest(query, best, seen.verified,
                             candidates_around(best.candidate.place, radius, end, seen.content));
     return candidates_.located(
-        query, closest,
+        query, closest, seen.verified,
         candidates_around(closest.candidate.place, radius + CandidateVerifier::kReach, end,
                           seen.content));
   }
