@@ -113,8 +113,8 @@ void print_parts(const cv::Mat1b& image, const Machine& machine) {
   const auto blobs = static_cast<double>(features.keypoints.size());
   fmt::print("Parts at {} x {}, {} keypoints, {} kernels     ms   bound ms   bound by\n",
              image.cols, image.rows, features.keypoints.size(), kernels.name);
-  print_part("integral image", integral_ms, pixels / machine.cycles_per_ms,
-             "one addition a pixel, in a chain");
+  print_part("integral image", integral_ms, pixels / 2 / machine.cycles_per_ms,
+             "one addition for two pixels, in a chain");
   print_part("Hessian", pyramid_ms, samples * 30 / lanes / 2 / machine.cycles_per_ms,
              "30 vector loads for a vector of samples, 2 a cycle");
   print_part("maxima", maxima_ms, pixels / 4 * 2 * 13 / lanes / 2 / machine.cycles_per_ms,
@@ -122,7 +122,7 @@ void print_parts(const cv::Mat1b& image, const Machine& machine) {
   print_part("patches", patches_ms, blobs * 22 * 22 / 2 / machine.cycles_per_ms,
              "484 corners a keypoint, 2 loads a cycle");
   print_part("descriptors", describe_ms,
-             blobs * (26 * 20 * 16 + 16 * 16 * 14) / lanes / 2 / machine.cycles_per_ms,
+             blobs * (26 * 20 * 16 + 64 * 14) / lanes / 2 / machine.cycles_per_ms,
              "operations on floats, 2 vectors a cycle");
   fmt::print("  (level 2 cache: {:.1f} GB/s copied; {:.2f} GHz)\n", machine.bytes_per_ms / 1e6,
              machine.cycles_per_ms / 1e6);

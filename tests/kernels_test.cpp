@@ -291,7 +291,8 @@ TEST_P(EveryKernel, ReadsContentsAtAnyWord) {
 
 TEST_P(EveryKernel, FindsTheNearestTwoAmongAnyNumber) {
   Random random;
-  for (const std::size_t num_others : {1U, 2U, 3U, 4U, 5U, 7U, 8U, 31U, 64U, 301U}) {
+  for (const std::size_t num_others :
+       {1U, 2U, 3U, 4U, 5U, 7U, 8U, 12U, 31U, 64U, 256U, 257U, 601U}) {
     const Bytes descriptors = random_bytes(random, kMatchLanes);
     const Bytes others = random_bytes(random, num_others);
     ASSERT_EQ(nearest_two(*GetParam(), descriptors, others),
@@ -302,16 +303,20 @@ TEST_P(EveryKernel, FindsTheNearestTwoAmongAnyNumber) {
 
 TEST_P(EveryKernel, FirstOfEquallyNearOnesIsNearest) {
   Random random;
-  const Bytes descriptors = random_bytes(random, kMatchLanes);
-  Bytes others = random_bytes(random, 3);
-  others.insert(others.end(), descriptors.begin(), descriptors.end());
-  others.insert(others.end(), descriptors.begin(), descriptors.end());
-  const Neighbours found = nearest_two(*GetParam(), descriptors, others);
-  EXPECT_EQ(found, expected_neighbours(descriptors, others));
-  for (std::size_t lane = 0; lane < kMatchLanes; ++lane) {
-    EXPECT_EQ(found.index[lane], static_cast<int>(lane) + 3);
-    EXPECT_EQ(found.distance_sq[lane], 0);
-    EXPECT_EQ(found.second_distance_sq[lane], 0);
+  for (const std::size_t num_between : {0U, 300U}) {
+    const Bytes descriptors = random_bytes(random, kMatchLanes);
+    const Bytes between = random_bytes(random, num_between);
+    Bytes others = random_bytes(random, 3);
+    others.insert(others.end(), descriptors.begin(), descriptors.end());
+    others.insert(others.end(), between.begin(), between.end());
+    others.insert(others.end(), descriptors.begin(), descriptors.end());
+    const Neighbours found = nearest_two(*GetParam(), descriptors, others);
+    EXPECT_EQ(found, expected_neighbours(descriptors, others));
+    for (std::size_t lane = 0; lane < kMatchLanes; ++lane) {
+      EXPECT_EQ(found.index[lane], static_cast<int>(lane) + 3);
+      EXPECT_EQ(found.distance_sq[lane], 0);
+      EXPECT_EQ(found.second_distance_sq[lane], 0);
+    }
   }
 }
 

@@ -54,8 +54,7 @@ void HessianPyramid::build(const IntegralImage& integral, const Kernels& kernels
     octave.samples = {(size.width - 1) / step + 1, (size.height - 1) / step + 1};
     octave.stride = round_up(octave.samples.width, kPadding) + kPadding;
     for (auto& layer : octave.layers) {
-      layer.resize(static_cast<std::size_t>(octave.stride) *
-                   static_cast<std::size_t>(octave.samples.height));
+      layer.create(octave.samples.height, octave.stride);
     }
     const int tile = static_cast<int>(kHessianRun) * kRowStep_px / step;
     const int first_new = o == 0 ? 0 : 2;

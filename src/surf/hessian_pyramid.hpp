@@ -68,13 +68,13 @@ class HessianPyramid {
   struct Octave {
     cv::Size samples;
     int stride = 0;
-    std::array<std::vector<float>, kIntervals> layers;
+    std::array<cv::Mat1f, kIntervals> layers;
 
     [[nodiscard]] const float* row(int interval, int y) const {
-      return layers[static_cast<std::size_t>(interval)].data() + std::ptrdiff_t{y} * stride;
+      return layers[static_cast<std::size_t>(interval)][y];
     }
     [[nodiscard]] float* row(int interval, int y) {
-      return layers[static_cast<std::size_t>(interval)].data() + std::ptrdiff_t{y} * stride;
+      return layers[static_cast<std::size_t>(interval)][y];
     }
   };
 

@@ -14,8 +14,8 @@ namespace loopbit {
 /// A descriptor's patch reaches this many scales from its keypoint, along its own axes.
 inline constexpr double kPatchReachScales = kCells / 2.0;
 
-/// Mean grey levels of 21 x 21 cells, a scale wide each; rows of kCellStride.
-using Patch = std::array<float, kCells * kCellStride>;
+/// Mean grey levels of 21 x 21 cells, a scale wide each, as they lie in memory.
+using Patch = std::array<float, kCellsInMemory>;
 
 /// The cells around an upright keypoint; their edges are rounded to pixels. The patch must lie
 /// within the image.

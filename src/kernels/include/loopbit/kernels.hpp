@@ -35,11 +35,12 @@ inline constexpr float kDescriptorScale = 254.0F;
 /// A descriptor is made of 20 x 20 samples, each of which spans 2 x 2 of 21 x 21 cells.
 inline constexpr std::size_t kSamples = 20;
 inline constexpr std::size_t kCells = kSamples + 1;
-/// Cells in memory: rows of 21 and padding.
+/// Cells in memory: rows of 21 and padding, and behind the last row as much as a vector may read.
 inline constexpr std::size_t kCellStride = 24;
+inline constexpr std::size_t kCellsInMemory = kCells * kCellStride + 16;
 
 /// Hessian responses are computed in runs of at most so many samples.
-inline constexpr std::ptrdiff_t kHessianRun = 128;
+inline constexpr std::ptrdiff_t kHessianRun = 640;
 
 /// An integral image whose rows have the even columns first, then the odd ones: corner (row, 2 i)
 /// is corners[row * stride + i], corner (row, 2 i + 1) lies `half` further.
@@ -180,8 +181,8 @@ struct Kernels {
   void (*maxima_row)(const float* const* layers, std::ptrdiff_t stride, std::ptrdiff_t count,
                      float min_response, std::uint8_t* is_maximum);
   /// The mean grey levels of kCells x kCells cells around a point, one `scale` in px wide each;
-  /// their edges are rounded to pixels and cut off at the image's. Rows of kCellStride, the rest
-  /// padding.
+  /// their edges are rounded to pixels and cut off at the image's. `cells` has room for
+  /// kCellsInMemory.
   void (*upright_cells)(const IntegralView& integral, float x_px, float y_px, float scale,
                         float* cells);
   /// The SURF descriptor (Bay et al. 2008, section 4.2) of such cells: sums of dx, dy, |dx| and
