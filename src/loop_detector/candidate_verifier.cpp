@@ -19,8 +19,6 @@ constexpr std::size_t kMinSharedMatches = 4;
 constexpr std::size_t kMinSharedAtFirst = 1;
 /// Of the places beside a candidate, so many are looked at closer.
 constexpr std::size_t kMaxBeside = 4;
-/// So many of the strongest keypoints tell which of the places beside each other is the nearest.
-constexpr std::size_t kKeypointsToLocate = 300;
 /// The nearest place shows at least this part of the distinct inliers that one beside it has.
 constexpr double kMinPartOfInliers = 0.7;
 
@@ -39,8 +37,11 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
   promising_.clear();
   promising_features_.clear();
   sightings_.clear();
+  num_looks_ = 0;
   std::vector<VerifiedCandidate> verified = unverified(candidates);
-  const std::vector<std::size_t> order = first_look(query, verified, verifications_);
+  verifications_.resize(std::max(verifications_.size(), verified.size()));
+  for (Verification& verification : verifications_) verification.inliers.clear();
+  const std::vector<std::size_t> order = by_first_look(query, verified);
   const auto closer =
       std::min(order.size(), static_cast<std::size_t>(options_.verification.max_closer_looks));
   look_closer(query, std::span(order).first(closer), verified);
@@ -62,7 +63,7 @@ VerifiedCandidate CandidateVerifier::closest(const Query& query, const VerifiedC
   VerifiedCandidate best = candidate;
   std::erase_if(around, [&](const Candidate& c) { return c.place == candidate.candidate.place; });
   std::vector<VerifiedCandidate> neighbours = unverified(around);
-  std::vector<std::size_t> order = first_look(query, neighbours, beside_);
+  std::vector<std::size_t> order = by_first_look(query, neighbours);
   order.resize(std::min(order.size(), kMaxBeside));
   for (const std::size_t i : order) {
     VerifiedCandidate& neighbour = neighbours[i];
@@ -115,9 +116,7 @@ std::vector<double> CandidateVerifier::shared_around(const Query& query,
   std::vector<int> matches;
   matches.reserve(around.size());
   for (const Candidate& c : around) {
-    verifier_.match_strongest(query.features, places_.features(c.place), kKeypointsToLocate,
-                              verification_);
-    matches.push_back(static_cast<int>(verification_.matches.size()));
+    matches.push_back(static_cast<int>(first_look(query, c.place).size()));
   }
   std::vector<double> shared;
   shared.reserve(matches.size());
@@ -154,12 +153,24 @@ std::vector<VerifiedCandidate> CandidateVerifier::unverified(
   return unverified;
 }
 
+/// The matches of the strongest keypoints, which are found once a frame; valid until the next look.
+const std::vector<Match>& CandidateVerifier::first_look(const Query& query, PlaceId place) {
+  for (std::size_t i = 0; i < num_looks_; ++i) {
+    if (looks_[i].place == place) return looks_[i].result.matches;
+  }
+  if (num_looks_ == looks_.size()) looks_.emplace_back();
+  Look& look = looks_[num_looks_++];
+  look.place = place;
+  verifier_.match_strongest(query.features, places_.features(place),
+                            static_cast<std::size_t>(options_.verification.first_look_keypoints),
+                            look.result);
+  return look.result.matches;
+}
+
 /// Indices into `verified`, those first that may be expected to have the highest scores: a place
-/// that shares keypoints shares strong ones, too. Leaves these matches in `looks`.
-std::vector<std::size_t> CandidateVerifier::first_look(
-    const Query& query, const std::vector<VerifiedCandidate>& verified,
-    std::vector<Verification>& looks) {
-  looks.resize(std::max(looks.size(), verified.size()));
+/// that shares keypoints shares strong ones, too.
+std::vector<std::size_t> CandidateVerifier::by_first_look(
+    const Query& query, const std::vector<VerifiedCandidate>& verified) {
   const auto keypoints = static_cast<double>(query.features.keypoints.size());
   const double looked_at = options_.verification.first_look_keypoints;
   const double worth =
@@ -168,10 +179,8 @@ std::vector<std::size_t> CandidateVerifier::first_look(
   scores.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
     VerifiedCandidate expected = verified[i];
-    verifier_.match_strongest(query.features, places_.features(expected.candidate.place),
-                              static_cast<std::size_t>(options_.verification.first_look_keypoints),
-                              looks[i]);
-    expected.distinct_inliers = static_cast<int>(looks[i].matches.size());
+    const auto matches = first_look(query, expected.candidate.place).size();
+    expected.distinct_inliers = static_cast<int>(matches);
     expected.inlier_worth = worth;
     scores.emplace_back(-agreement_.score(expected, query.is_step), i);
   }
@@ -258,8 +267,9 @@ void CandidateVerifier::look_at_others(const Query& query, std::span<const std::
                                        std::vector<VerifiedCandidate>& verified) {
   for (const std::size_t i : order) {
     if (!is_elsewhere(verified[i])) continue;
-    if (num_shared(verifications_[i].matches) < kMinSharedAtFirst) continue;
-    const Features& place = places_.features(verified[i].candidate.place);
+    const PlaceId number = verified[i].candidate.place;
+    if (num_shared(first_look(query, number)) < kMinSharedAtFirst) continue;
+    const Features& place = places_.features(number);
     verifier_.match_some(query.features, promising_features_, place, verification_);
     if (verification_.matches.size() < kMinSharedMatches) continue;
     match(query, verified[i], verifications_[i]);

@@ -63,13 +63,18 @@ class CandidateVerifier {
   void complete(const Query& query, std::vector<VerifiedCandidate>& verified);
 
  private:
+  struct Look {
+    PlaceId place = 0;
+    Verification result;  ///< of the strongest keypoints
+  };
+
   [[nodiscard]] Spot spot_of(const VerifiedCandidate& candidate) const;
   std::vector<double> shared_around(const Query& query, const std::vector<Candidate>& around);
   [[nodiscard]] std::vector<VerifiedCandidate> unverified(
       const std::vector<Candidate>& candidates) const;
-  std::vector<std::size_t> first_look(const Query& query,
-                                      const std::vector<VerifiedCandidate>& verified,
-                                      std::vector<Verification>& looks);
+  const std::vector<Match>& first_look(const Query& query, PlaceId place);
+  std::vector<std::size_t> by_first_look(const Query& query,
+                                         const std::vector<VerifiedCandidate>& verified);
   void match(const Query& query, VerifiedCandidate& candidate, Verification& result);
   Verification& match_once(const Query& query, const std::vector<VerifiedCandidate>& verified,
                            VerifiedCandidate& candidate);
@@ -91,8 +96,9 @@ class CandidateVerifier {
   const KnownLoops& known_loops_;
   Verifier verifier_;
   std::vector<Verification> verifications_;  ///< of the candidates of this frame
-  std::vector<Verification> beside_;         ///< first looks at the places beside one of them
-  Verification verification_;                ///< of one such place
+  Verification verification_;                ///< of a place beside one of them
+  std::vector<Look> looks_;                  ///< the first ones are of this frame
+  std::size_t num_looks_ = 0;
   std::vector<Spot> promising_;              ///< where promising candidates stand
   std::vector<int> promising_features_;      ///< of the query: inliers of one of them, in order
   std::vector<Sighting> sightings_;          ///< none if no candidate is promising

@@ -42,7 +42,7 @@ struct ExclusionOptions {
 
 /// The one rule that accepts a match: score >= min_score.
 struct DecisionOptions {
-  double min_score = 14.5;
+  double min_score = 14;
   double full_share = 0.1;
   int full_steps = 200;
   int full_view_inliers = 40;

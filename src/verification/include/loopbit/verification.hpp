@@ -24,7 +24,7 @@ struct Match {
 };
 
 struct VerificationOptions {
-  int first_look_keypoints = 120;
+  int first_look_keypoints = 300;
   int max_closer_looks = 5;
   double max_ratio = 0.8;
   int min_matches = 8;
