@@ -99,9 +99,9 @@ class CandidateVerifier {
   Verification verification_;                ///< of a place beside one of them
   std::vector<Look> looks_;                  ///< the first ones are of this frame
   std::size_t num_looks_ = 0;
-  std::vector<Spot> promising_;              ///< where promising candidates stand
-  std::vector<int> promising_features_;      ///< of the query: inliers of one of them, in order
-  std::vector<Sighting> sightings_;          ///< none if no candidate is promising
+  std::vector<Spot> promising_;          ///< where promising candidates stand
+  std::vector<int> promising_features_;  ///< of the query: inliers of one of them, in order
+  std::vector<Sighting> sightings_;      ///< none if no candidate is promising
 };
 
 }  // namespace loopbit
