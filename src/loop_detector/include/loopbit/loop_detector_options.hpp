@@ -42,13 +42,13 @@ struct ExclusionOptions {
 
 /// The one rule that accepts a match: score >= min_score.
 struct DecisionOptions {
-  double min_score = 14;
+  double min_score = 15;
   double full_share = 0.1;
   int full_steps = 200;
   int full_view_inliers = 40;
   bool distinctness = true;
   double chance_evidence = 6.0;
-  double agreement_weight = 0.4;
+  double agreement_weight = 0.5;
   double agreement_memory = 0.8;
   int followed_ways = 3;
   bool count_matches = false;
