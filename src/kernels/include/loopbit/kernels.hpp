@@ -40,7 +40,7 @@ inline constexpr std::size_t kCellStride = 24;
 inline constexpr std::size_t kCellsInMemory = kCells * kCellStride + 16;
 
 /// Hessian responses are computed in runs of at most so many samples.
-inline constexpr std::ptrdiff_t kHessianRun = 640;
+inline constexpr std::ptrdiff_t kHessianRun = 320;
 
 /// An integral image whose rows have the even columns first, then the odd ones: corner (row, 2 i)
 /// is corners[row * stride + i], corner (row, 2 i + 1) lies `half` further.
