@@ -450,15 +450,15 @@ Features strongest(const Features& all, std::size_t num) {
   return {all.working_size_px, dark, part(all.keypoints), part(all.descriptors)};
 }
 
-TEST(Verify, MatchesTheStrongestFeatures) {
+TEST(Verify, AFirstLookMatchesTheStrongestFeatures) {
   constexpr int kLooked = 60;
   const Features query = extract_surf(view(2));
   const Features place = extract_surf(view(2, {12, 5}));
   const Features of_query = strongest(query, kLooked);
   const Features of_place = strongest(place, kLooked);
-  Verifier verifier;
+  Verifier verifier({.first_look_keypoints = kLooked});
   Verification look;
-  verifier.match_strongest(query, place, kLooked, look);
+  verifier.match_strongest(query, place, look);
   const std::vector<Match> expected = match_features(of_query, of_place, 0.8);
   ASSERT_GT(expected.size(), 5U);
   ASSERT_EQ(look.matches.size(), expected.size());
@@ -495,14 +495,14 @@ TEST(Verify, MatchesOfSomeFeaturesAreThoseOfAll) {
   EXPECT_TRUE(some.matches.empty());
 }
 
-TEST(Verify, FewFeaturesAreAllAmongTheStrongest) {
+TEST(Verify, AFirstLookAtFewFeaturesIsAWholeOne) {
   const Features query = extract_surf(view(2), {.max_keypoints = 100});
   const Features place = extract_surf(view(2, {12, 5}), {.max_keypoints = 90});
   Verifier verifier;
   Verification look;
-  verifier.match_strongest(query, place, 120, look);
+  verifier.match_strongest(query, place, look);
   EXPECT_EQ(look.matches, verify(query, place).matches);
-  verifier.match_strongest(query, {}, 120, look);
+  verifier.match_strongest(query, {}, look);
   EXPECT_TRUE(look.matches.empty());
 }
 

@@ -40,7 +40,6 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
   num_looks_ = 0;
   std::vector<VerifiedCandidate> verified = unverified(candidates);
   verifications_.resize(std::max(verifications_.size(), verified.size()));
-  for (Verification& verification : verifications_) verification.inliers.clear();
   const std::vector<std::size_t> order = by_first_look(query, verified);
   const auto closer =
       std::min(order.size(), static_cast<std::size_t>(options_.verification.max_closer_looks));
@@ -49,7 +48,8 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
   look_at_others(query, std::span(order).subspan(closer), verified);
   note_sightings(verified);
   for (std::size_t i = 0; i < verified.size(); ++i) {
-    find_distinctness(verified[i], verifications_[i]);
+    // Of those left out, what lies there is of an earlier frame.
+    if (verified[i].inliers > 0) find_distinctness(verified[i], verifications_[i]);
   }
   return verified;
 }
@@ -161,9 +161,7 @@ const std::vector<Match>& CandidateVerifier::first_look(const Query& query, Plac
   if (num_looks_ == looks_.size()) looks_.emplace_back();
   Look& look = looks_[num_looks_++];
   look.place = place;
-  verifier_.match_strongest(query.features, places_.features(place),
-                            static_cast<std::size_t>(options_.verification.first_look_keypoints),
-                            look.result);
+  verifier_.match_strongest(query.features, places_.features(place), look.result);
   return look.result.matches;
 }
 

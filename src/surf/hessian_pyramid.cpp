@@ -52,9 +52,9 @@ void HessianPyramid::build(const IntegralImage& integral, const Kernels& kernels
     const int step = step_px(o);
     Octave& octave = octaves_[static_cast<std::size_t>(o)];
     octave.samples = {(size.width - 1) / step + 1, (size.height - 1) / step + 1};
-    octave.stride = round_up(octave.samples.width, kPadding) + kPadding;
+    const int stride = round_up(octave.samples.width, kPadding) + kPadding;
     for (auto& layer : octave.layers) {
-      layer.create(octave.samples.height, octave.stride);
+      layer.create(octave.samples.height, stride);
     }
     const int tile = static_cast<int>(kHessianRun) * kRowStep_px / step;
     const int first_new = o == 0 ? 0 : 2;
@@ -134,12 +134,13 @@ void HessianPyramid::find_maxima(float min_response, const Kernels& kernels,
                                  std::vector<Maximum>& maxima) {
   for (int o = 0; o < kOctaves; ++o) {
     const Octave& octave = octaves_[static_cast<std::size_t>(o)];
-    is_maximum_.resize(static_cast<std::size_t>(octave.stride));
+    const int stride = octave.layers.front().cols;
+    is_maximum_.resize(static_cast<std::size_t>(stride));
     for (int i = 1; i + 1 < kIntervals; ++i) {
       const cv::Rect valid = valid_samples(o, i + 1);
       for (int y = valid.y + 1; y < valid.y + valid.height - 1; ++y) {
         const std::array layers = {octave.row(i - 1, y), octave.row(i, y), octave.row(i + 1, y)};
-        kernels.maxima_row(layers.data(), octave.stride, octave.samples.width, min_response,
+        kernels.maxima_row(layers.data(), stride, octave.samples.width, min_response,
                            is_maximum_.data());
         append_marked(o, i, y, maxima);
       }

@@ -67,8 +67,7 @@ class HessianPyramid {
  private:
   struct Octave {
     cv::Size samples;
-    int stride = 0;
-    std::array<cv::Mat1f, kIntervals> layers;
+    std::array<cv::Mat1f, kIntervals> layers;  ///< padded; rows begin at cache lines
 
     [[nodiscard]] const float* row(int interval, int y) const {
       return layers[static_cast<std::size_t>(interval)][y];

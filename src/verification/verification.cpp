@@ -132,12 +132,13 @@ class Verifier::Impl {
   }
 
   void match(const Features& query, const Features& place, Verification& result) {
-    match_strongest(query, place, kAll, result);
+    matcher_.match(query, place, options_.max_ratio, kAll, result.matches);
+    clear_geometry(result);
   }
 
-  void match_strongest(const Features& query, const Features& place, std::size_t strongest,
-                       Verification& result) {
-    matcher_.match(query, place, options_.max_ratio, strongest, result.matches);
+  void match_strongest(const Features& query, const Features& place, Verification& result) {
+    matcher_.match(query, place, options_.max_ratio,
+                   static_cast<std::size_t>(options_.first_look_keypoints), result.matches);
     clear_geometry(result);
   }
 
@@ -179,9 +180,8 @@ void Verifier::match(const Features& query, const Features& place, Verification&
   impl_->match(query, place, result);
 }
 
-void Verifier::match_strongest(const Features& query, const Features& place, std::size_t strongest,
-                               Verification& result) {
-  impl_->match_strongest(query, place, strongest, result);
+void Verifier::match_strongest(const Features& query, const Features& place, Verification& result) {
+  impl_->match_strongest(query, place, result);
 }
 
 void Verifier::match_some(const Features& query, std::span<const int> asked, const Features& place,

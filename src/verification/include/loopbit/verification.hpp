@@ -102,9 +102,8 @@ class Verifier {
   /// Sets `result.matches` (see match_features) and clears the rest.
   void match(const Features& query, const Features& place, Verification& result);
 
-  /// The same for about so many of the strongest features of each, in a fraction of the time.
-  void match_strongest(const Features& query, const Features& place, std::size_t strongest,
-                       Verification& result);
+  /// The same for the strongest `first_look_keypoints` features of each, in a fraction of the time.
+  void match_strongest(const Features& query, const Features& place, Verification& result);
 
   /// Of what match() finds, the matches of the query's features `asked` (indices, rising), in the
   /// time of so many features.
