@@ -68,6 +68,17 @@ TEST_P(EveryKernel, IntegralImageSumsBoxes) {
   }
 }
 
+TEST(IntegralImage, SumsPartsOfPixels) {
+  const cv::Mat1b gray = (cv::Mat1b(2, 3) << 1, 2, 4, 8, 16, 32);
+  IntegralImage integral;
+  integral.load(gray, active_kernels());
+  EXPECT_DOUBLE_EQ(integral.sum_before(3, 2), 63);
+  EXPECT_DOUBLE_EQ(integral.sum_before(0.5, 0.25), 0.5 * 0.25 * 1);
+  EXPECT_DOUBLE_EQ(integral.sum_before(1.75, 1.5), 1 + 0.75 * 2 + 0.5 * (8 + 0.75 * 16));
+  EXPECT_DOUBLE_EQ(integral.sum_before(-1, 1), 0);
+  EXPECT_DOUBLE_EQ(integral.sum_before(9, 9), 63);
+}
+
 /// dlib computes with doubles, we with floats: by so much of the largest response do they differ.
 constexpr double kTolerance = 1e-5;
 

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <set>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -331,6 +332,47 @@ TEST(Surf, RotatedFeaturesFollowATurnedImage) {
   const int upright = right_matches_when_turned(true);
   EXPECT_GT(rotated, 60);
   EXPECT_GT(rotated, 2 * upright);
+}
+
+/// An image turned about its middle, whole, with grey around it, and what turned it.
+std::pair<cv::Mat1b, cv::Matx23d> turned_by(double degrees, const cv::Mat1b& gray) {
+  const int side = cvCeil(std::hypot(gray.cols, gray.rows));
+  cv::Matx23d turn =
+      cv::getRotationMatrix2D(cv::Point2f(cv::Size2f(gray.size()) / 2.0F), degrees, 1);
+  turn(0, 2) += (side - gray.cols) / 2.0;
+  turn(1, 2) += (side - gray.rows) / 2.0;
+  cv::Mat1b turned;
+  cv::warpAffine(gray, turned, turn, {side, side}, cv::INTER_LINEAR, cv::BORDER_CONSTANT, 128);
+  return {turned, turn};
+}
+
+TEST(Surf, BlobsAndDirectionsTurnWithTheImage) {
+  std::size_t keypoints = 0;
+  std::vector<double> errors_deg;  // of the directions of those found in both images
+  for (const double degrees : {20.0, 45.0, 75.0}) {
+    const cv::Mat1b gray = view(9);
+    const auto [turned, turn] = turned_by(degrees, gray);
+    const Features before = extract_unscaled(gray, 400, false);
+    const Features after = extract_unscaled(turned, 400, false);
+    keypoints += before.keypoints.size();
+    for (const Keypoint& keypoint : before.keypoints) {
+      const cv::Vec2d moved = turn * cv::Vec3d(keypoint.x_px, keypoint.y_px, 1);
+      const auto distance_px = [&](const Keypoint& other) {
+        return std::hypot(other.x_px - moved[0], other.y_px - moved[1]);
+      };
+      const auto nearest = std::min_element(
+          after.keypoints.begin(), after.keypoints.end(),
+          [&](const auto& a, const auto& b) { return distance_px(a) < distance_px(b); });
+      if (distance_px(*nearest) > 2) continue;
+      const double turned_rad = keypoint.angle_rad - nearest->angle_rad;
+      errors_deg.push_back(std::abs(std::remainder(turned_rad * 180 / CV_PI - degrees, 360)));
+    }
+  }
+  // Without smoothing, 65 % are found again.
+  EXPECT_GT(errors_deg.size() * 100, keypoints * 72);
+  // With wavelets of 4 x 4 scales and rounded edges, half the errors are larger than 3.4 degrees.
+  std::sort(errors_deg.begin(), errors_deg.end());
+  EXPECT_LT(errors_deg[errors_deg.size() / 2], 2.9);
 }
 
 TEST(Surf, DimImageKeepsMostKeypoints) {

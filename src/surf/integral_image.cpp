@@ -30,4 +30,17 @@ void IntegralImage::load(const cv::Mat1b& gray, const Kernels& kernels) {
   }
 }
 
+double IntegralImage::sum_before(double x, double y) const {
+  x = std::clamp(x, 0.0, static_cast<double>(size_px_.width));
+  y = std::clamp(y, 0.0, static_cast<double>(size_px_.height));
+  const int left = std::min(static_cast<int>(x), size_px_.width - 1);
+  const int top = std::min(static_cast<int>(y), size_px_.height - 1);
+  const auto along_row = [&](int row_y) {
+    const double before = row(row_y)[column(left)];
+    return before + (x - left) * (row(row_y)[column(left + 1)] - before);
+  };
+  const double above = along_row(top);
+  return above + (y - top) * (along_row(top + 1) - above);
+}
+
 }  // namespace loopbit

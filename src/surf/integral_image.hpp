@@ -33,6 +33,9 @@ class IntegralImage {
     return static_cast<std::int32_t>(row(y1)[column(x1)] - row(y1)[column(x0)] -
                                      row(y0)[column(x1)] + row(y0)[column(x0)]);
   }
+  /// The sum over all that lies above and left of a point, to parts of pixels; pixel (0, 0) is the
+  /// square from (0, 0) to (1, 1). A point outside counts as the nearest of the image.
+  [[nodiscard]] double sum_before(double x, double y) const;
 
  private:
   cv::Size size_px_;

@@ -40,38 +40,43 @@ float dominant_angle(const IntegralImage& integral, const Keypoint& keypoint) {
   constexpr int kSectors = 72;
   constexpr int kWindow = 12;  // 60 degrees
   constexpr float kSigma = 2.5F;
-  const int step = std::max(1, cvRound(keypoint.scale));
-  const int x0 = static_cast<int>(keypoint.x_px + 1.0F);
-  const int y0 = static_cast<int>(keypoint.y_px + 1.0F);
-  const cv::Size size = integral.size_px();
-  const auto box = [&](int left, int top, int right, int bottom) {
-    return static_cast<float>(
-        integral.box(std::clamp(left, 0, size.width), std::clamp(top, 0, size.height),
-                     std::clamp(right, 0, size.width), std::clamp(bottom, 0, size.height)));
+  constexpr int kReach = kRadius + 1;  // of a wavelet within the radius
+  constexpr std::size_t kSide = 2 * kReach + 1;
+
+  const double scale = keypoint.scale;
+  std::array<double, kSide * kSide> sums{};
+  for (int v = -kReach, i = 0; v <= kReach; ++v) {
+    for (int u = -kReach; u <= kReach; ++u, ++i) {
+      sums[static_cast<std::size_t>(i)] =
+          integral.sum_before(keypoint.x_px + 0.5 + u * scale, keypoint.y_px + 0.5 + v * scale);
+    }
+  }
+  const auto sum = [&](int u, int v) {
+    return sums[static_cast<std::size_t>(v + kReach) * kSide +
+                static_cast<std::size_t>(u + kReach)];
   };
+  // Of the pixels before an edge, those on its far side minus those on its near one.
+  const auto across_x = [&](int u, int v) { return sum(u + 2, v) - 2 * sum(u, v) + sum(u - 2, v); };
+  const auto across_y = [&](int u, int v) { return sum(u, v + 2) - 2 * sum(u, v) + sum(u, v - 2); };
+
   std::array<cv::Point2f, kSectors> sectors{};
   for (int v = -kRadius; v <= kRadius; ++v) {
     for (int u = -kRadius; u <= kRadius; ++u) {
       if (u * u + v * v >= kRadius * kRadius) continue;
       const float weight = std::exp(-static_cast<float>(u * u + v * v) / (2 * kSigma * kSigma));
-      const int x = x0 + u * step;
-      const int y = y0 + v * step;
-      const int reach = 2 * step;
-      const float dx =
-          box(x, y - reach, x + reach, y + reach) - box(x - reach, y - reach, x, y + reach);
-      const float dy =
-          box(x - reach, y, x + reach, y + reach) - box(x - reach, y - reach, x + reach, y);
+      const auto dx = static_cast<float>(across_x(u, v + 1) - across_x(u, v - 1));
+      const auto dy = static_cast<float>(across_y(u + 1, v) - across_y(u - 1, v));
       const auto sector = static_cast<std::size_t>(cv::fastAtan2(dy, dx) * (kSectors / 360.0F));
       sectors[sector % kSectors] += weight * cv::Point2f(dx, dy);
     }
   }
   cv::Point2f best;
   for (int first = 0; first < kSectors; ++first) {
-    cv::Point2f sum;
+    cv::Point2f in_window;
     for (int i = first; i < first + kWindow; ++i) {
-      sum += sectors[static_cast<std::size_t>(i % kSectors)];
+      in_window += sectors[static_cast<std::size_t>(i % kSectors)];
     }
-    if (sum.dot(sum) > best.dot(best)) best = sum;
+    if (in_window.dot(in_window) > best.dot(best)) best = in_window;
   }
   return cv::fastAtan2(best.y, best.x) * (std::numbers::pi_v<float> / 180.0F);
 }

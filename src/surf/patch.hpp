@@ -27,7 +27,8 @@ void upright_patch(const IntegralImage& integral, const Keypoint& keypoint, cons
 void turned_patch(const IntegralImage& integral, const Keypoint& keypoint, Patch& patch);
 
 /// The dominant direction of the gradients around a keypoint, in radians (Bay et al. 2008, section
-/// 4.1); x right, y down.
+/// 4.1); x right, y down. Their wavelets are 4 scales long and 2 wide, not 4 x 4, and their edges
+/// not rounded to pixels: a turned image then turns the direction better.
 float dominant_angle(const IntegralImage& integral, const Keypoint& keypoint);
 
 }  // namespace loopbit

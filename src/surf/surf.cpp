@@ -26,6 +26,8 @@ constexpr double kLeastLinearFactor = 0.5;
 constexpr int kGridCellPx = 80;
 /// A cell may hold this many times its share of the budget.
 constexpr int kMaxShares = 3;
+/// Of the Gaussian that images are smoothed by for features that turn with them.
+constexpr double kTurningSigma_px = 1.4;
 
 /// Where the middle of a scaled pixel lies between the middles of two pixels, along one axis;
 /// within the image.
@@ -61,7 +63,7 @@ class SurfExtractor::Impl {
   }
 
   void extract(const cv::Mat1b& gray, Features& features) {
-    integral_.load(working_image(gray), kernels_);
+    integral_.load(smoothed(working_image(gray)), kernels_);
     pyramid_.build(integral_, kernels_);
     maxima_.clear();
     pyramid_.find_maxima(kMinResponse, kernels_, maxima_);
@@ -85,6 +87,14 @@ class SurfExtractor::Impl {
       interpolate(gray, size);
     }
     return working_;
+  }
+
+  /// Boxes are square, so that they find other blobs where an image is turned; of a smooth image,
+  /// less so.
+  const cv::Mat1b& smoothed(const cv::Mat1b& working) {
+    if (options_.upright) return working;
+    cv::GaussianBlur(working, smoothed_, {}, kTurningSigma_px);
+    return smoothed_;
   }
 
   /// Linearly, as OpenCV's INTER_LINEAR_EXACT and in half the time.
@@ -195,6 +205,7 @@ class SurfExtractor::Impl {
   SurfOptions options_;
   const Kernels& kernels_;
   cv::Mat1b working_;
+  cv::Mat1b smoothed_;
   std::vector<std::int32_t> columns_;
   std::vector<std::int32_t> right_weights_;
   std::vector<std::uint16_t> blended_;

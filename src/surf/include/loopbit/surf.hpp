@@ -58,7 +58,7 @@ struct SurfOptions {
 
 /// Extracts features from image after image of any size. It owns its working memory, about 12 bytes
 /// a working pixel, and keeps it: for images of a size it has seen, nothing is allocated but what
-/// `features` lacks and what OpenCV needs to resize. Not thread-safe; use one a thread.
+/// `features` lacks and what OpenCV needs to resize or smooth. Not thread-safe; use one a thread.
 class SurfExtractor {
  public:
   /// Throws Error (kind option) if `options` are not valid.
