@@ -78,15 +78,17 @@ cv::Mat1b textured_image(cv::Size size, int scene) {
   const int largest_px = std::max(8, std::min(size.width, size.height) / 4);
   const int shapes = std::max(30, size.area() / 250);
   for (int i = 0; i < shapes; ++i) {
-    const cv::Point at(random.between(0, size.width), random.between(0, size.height));
+    // Arguments may be evaluated in any order; these lines are.
+    const int y = random.between(0, size.height);
+    const int x = random.between(0, size.width);
     // Few large shapes below, many small ones on top.
     const int side_px = std::max(3, largest_px * (shapes - i) / shapes * random.between(1, 4) / 4);
     const cv::Scalar level(random.between(0, 255));
     if (random.between(0, 1) == 0) {
-      cv::circle(image, at, side_px / 2, level, cv::FILLED);
+      cv::circle(image, {x, y}, side_px / 2, level, cv::FILLED);
     } else {
       const cv::Size sides(side_px, std::max(3, side_px * random.between(1, 4) / 2));
-      cv::rectangle(image, cv::Rect(at, sides), level, cv::FILLED);
+      cv::rectangle(image, cv::Rect({x, y}, sides), level, cv::FILLED);
     }
   }
   cv::GaussianBlur(image, image, {0, 0}, 0.8);

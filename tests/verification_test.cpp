@@ -220,16 +220,22 @@ TwoViews two_views(Random& random, int num_right, int num_random) {
   TwoViews views;
   const double turn_rad = 0.087;
   while (static_cast<int>(views.matches.size()) < num_right) {
-    const cv::Point3d p(16 * (random.uniform() - 0.5), 10 * (random.uniform() - 0.5),
-                        4 + 16 * random.uniform());
+    const double z = 4 + 16 * random.uniform();
+    const double y = 10 * (random.uniform() - 0.5);
+    const double x = 16 * (random.uniform() - 0.5);
+    const cv::Point3d p(x, y, z);
     const cv::Point3d q = p - cv::Point3d(0.5, 0.05, 0.5);
     const cv::Point3d turned(std::cos(turn_rad) * q.x - std::sin(turn_rad) * q.z, q.y,
                              std::sin(turn_rad) * q.x + std::cos(turn_rad) * q.z);
-    const cv::Point2d noise(0.3 * random.normal(), 0.3 * random.normal());
-    views.add(projected(p), projected(turned) + noise);
+    const double noise_y = 0.3 * random.normal();
+    const double noise_x = 0.3 * random.normal();
+    views.add(projected(p), projected(turned) + cv::Point2d(noise_x, noise_y));
   }
   views.num_right = views.matches.size();
-  for (int i = 0; i < num_random; ++i) views.add(random_pixel(random), random_pixel(random));
+  for (int i = 0; i < num_random; ++i) {
+    const cv::Point2d in_place = random_pixel(random);
+    views.add(random_pixel(random), in_place);
+  }
   return views;
 }
 
