@@ -31,7 +31,7 @@ Features few_features(int number) {
   for (int i = 0; i < 3; ++i) {
     features.keypoints.push_back({static_cast<float>(number), static_cast<float>(i), 1.2F, 0.0F});
     features.descriptors.emplace_back();
-    features.descriptors.back().fill(static_cast<std::int8_t>(number + i));
+    features.descriptors.back().fill(static_cast<std::int8_t>((number + i) % 255 - 127));
   }
   return features;
 }

@@ -109,6 +109,10 @@ std::optional<Features> features_from(std::span<const unsigned char> bytes) {
                    [](const Keypoint& keypoint) { return is_sane(keypoint); })) {
     return std::nullopt;
   }
+  // Kernels are made for -127 to 127.
+  for (const Descriptor& descriptor : features.descriptors) {
+    if (std::ranges::count(descriptor, std::int8_t{-128}) != 0) return std::nullopt;
+  }
   return features;
 }
 

@@ -58,7 +58,7 @@ struct SurfOptions {
 
 /// Extracts features from image after image of any size. It owns its working memory, about 12 bytes
 /// a working pixel, and keeps it: for images of a size it has seen, nothing is allocated but what
-/// `features` lacks and what OpenCV needs to resize or smooth. Not thread-safe; use one a thread.
+/// `features` lacks and what OpenCV needs to resize. Not thread-safe; use one a thread.
 class SurfExtractor {
  public:
   /// Throws Error (kind option) if `options` are not valid.
@@ -81,9 +81,9 @@ class SurfExtractor {
 /// SURF features of `gray`, 8 bits, at least 32 x 32 pixels.
 ///
 /// Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 2008. The budget of keypoints
-/// decides, not a threshold: the strongest are kept, of which a cell of a grid may hold three times
-/// its share, so that dim images keep as many. Only what 8 bits cannot tell from noise is left out.
-/// The same image gives the same bits with every kernel. Cost: see scripts/bench_surf.
+/// decides: the strongest are kept, of which a cell of a grid may hold three times its share. What
+/// 8 bits cannot tell from noise is left out, so dim images have fewer. The same image gives the
+/// same bits with every kernel. Cost: see scripts/bench_surf.
 Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options = {});
 
 }  // namespace loopbit
