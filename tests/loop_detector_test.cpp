@@ -593,6 +593,14 @@ TEST(LoopDetector, SkippedFrameNeedsNoTime) {
   EXPECT_EQ(detector.process(again(0), 110.0).match, 1);
 }
 
+TEST(LoopDetector, TheTimeOfASkippedFrameShutsNoneOut) {
+  LoopDetector detector(ten_seconds());
+  detector.skip(-10.0);
+  detector.process(view(0), -9.0);
+  detector.skip(1e18);
+  EXPECT_EQ(detector.process(again(0), 2.0).match, 1);
+}
+
 TEST(LoopDetector, TimesDoNotMatterUnlessTheWindowIsInSeconds) {
   LoopDetector detector(short_window_options());
   detector.process(view(0), 100.0);

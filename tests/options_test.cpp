@@ -382,6 +382,13 @@ TEST(OptionsFromJson, NumbersBeyondAnyRangeAreNamed) {
                [] { options_from_json(R"({"surf": {"max_keypoints": 1e999}})", "a.json"); });
 }
 
+TEST(OptionsFromJson, DeeplyNestedOnesAreRefused) {
+  const std::string open(200'000, '[');
+  const std::string close(200'000, ']');
+  expect_error(ErrorKind::option, {"a.json", "nested"},
+               [&] { options_from_json(R"({"surf": )" + open + close + "}", "a.json"); });
+}
+
 TEST(SetOption, ARefusedValueChangesNothing) {
   LoopDetectorOptions options;
   EXPECT_THROW(set_option(options, "surf.max_keypoints", "49"), Error);

@@ -256,6 +256,8 @@ TEST(PosesOfFrames, TakesTheNearestInTime) {
 TEST(PosesOfFrames, SortsByTimeAndTakesTheFirstOfTwins) {
   EXPECT_EQ(found_at({timed(3, 3), timed(1, 1), timed(3, 4), timed(2, 2)}, {1.0, 2.0, 3.0}),
             (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(found_at({timed(1, 1), timed(1, 2), timed(3, 3), timed(3, 4)}, {0.99, 1.01, 3.01}),
+            (std::vector<double>{1, 1, 3}));
 }
 
 TEST(PosesOfFrames, WithoutTimesRowsAreFrames) {

@@ -71,8 +71,9 @@ struct TimedPose {
 const TimedPose& nearest(const std::vector<TimedPose>& poses, double time_s) {
   const auto after = std::ranges::lower_bound(poses, time_s, {}, &TimedPose::time_s);
   if (after == poses.begin()) return poses.front();
-  if (after == poses.end()) return poses.back();
-  const auto before = after - 1;
+  // The first of equal times.
+  const auto before = std::ranges::lower_bound(poses, (after - 1)->time_s, {}, &TimedPose::time_s);
+  if (after == poses.end()) return *before;
   return time_s - before->time_s <= after->time_s - time_s ? *before : *after;
 }
 

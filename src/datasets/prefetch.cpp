@@ -7,6 +7,7 @@
 #include <thread>
 #include <utility>
 
+#include "loopbit/error.hpp"
 #include "loopbit/image_source.hpp"
 
 namespace loopbit {
@@ -98,6 +99,7 @@ class PrefetchSource final : public ImageSource {
 }  // namespace
 
 std::unique_ptr<ImageSource> prefetch(std::unique_ptr<ImageSource> source, std::size_t depth) {
+  if (depth == 0) throw Error(ErrorKind::option, "depth is 0, but must be 1 frame or more.");
   return std::make_unique<PrefetchSource>(std::move(source), depth);
 }
 

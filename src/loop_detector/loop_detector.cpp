@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <limits>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -201,13 +202,9 @@ class LoopDetector::Impl {
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
   Detection skip(std::optional<double> timestamp_s) {
-    const double last_s = times_s_.empty() ? 0.0 : times_s_.back();
-    const bool is_usable = timestamp_s && std::isfinite(*timestamp_s) && *timestamp_s > last_s;
-    Detection detection{.frame = size(),
-                        .timestamp_s = is_usable ? *timestamp_s : last_s,
-                        .status = Status::unreadable};
+    const Detection detection{
+        .frame = size(), .timestamp_s = timestamp_s, .status = Status::unreadable};
     add_place(BinaryContent{}, Features{}, detection, cv::Mat());
-    detection.timestamp_s = timestamp_s;
     return detection;
   }
 
@@ -253,7 +250,11 @@ class LoopDetector::Impl {
   PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection,
                     const cv::Mat& image) {
     memory_.add(detection, content, std::move(features), image);
-    times_s_.push_back(detection.timestamp_s.value_or(0.0));
+    // The time of a frame that nothing matches may be wrong, and would shut out those after it.
+    const double last_s =
+        times_s_.empty() ? -std::numeric_limits<double>::infinity() : times_s_.back();
+    times_s_.push_back(
+        detection.status == Status::unreadable ? last_s : detection.timestamp_s.value_or(0.0));
     return index_.add(content);
   }
 
@@ -410,7 +411,7 @@ class LoopDetector::Impl {
   LoopDetectorOptions options_;
   PlaceIndex index_;
   PlaceMemory memory_;
-  std::vector<double> times_s_;  ///< of each frame of this session; 0 where there is none
+  std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   RecentView recent_view_;
   int latest_view_inliers_ = 0;  ///< see FrameContext
   Agreement agreement_;

@@ -114,9 +114,21 @@ std::string to_json(const LoopDetectorOptions& options) {
 }
 
 LoopDetectorOptions options_from_json(const std::string& json, const std::string& source) {
+  // A message that shows a value recurses into it.
+  const auto check_depth = [](int depth, Json::parse_event_t /*event*/, const Json& /*value*/) {
+    constexpr int kMaxDepth = 8;
+    if (depth > kMaxDepth) {
+      throw Error(
+          ErrorKind::option,
+          fmt::format("The settings are nested more than {} deep; they are a JSON object of "
+                      "sections, each an object of settings.",
+                      kMaxDepth));
+    }
+    return true;
+  };
   LoopDetectorOptions options;
   try {
-    const Json parsed = Json::parse(json, nullptr, true, true);
+    const Json parsed = Json::parse(json, check_depth, true, true);
     if (!parsed.is_object()) {
       throw Error(ErrorKind::option, "The settings must be a JSON object of sections.");
     }

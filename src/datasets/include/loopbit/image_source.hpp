@@ -62,7 +62,8 @@ std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source, std:
                                        std::size_t limit);
 
 /// `source`, read ahead by a thread of its own, at most `depth` frames (at least 1). Frames and
-/// their order are the same; decoding overlaps with what is done with them.
+/// their order are the same; decoding overlaps with what is done with them. Throws Error (kind
+/// option) if `depth` is 0.
 std::unique_ptr<ImageSource> prefetch(std::unique_ptr<ImageSource> source, std::size_t depth);
 
 }  // namespace loopbit

@@ -57,16 +57,15 @@ struct DecisionOptions {
     using S = DecisionOptions;
     return std::tuple{
         Field{"min_score", &S::min_score, 1.0, 1e9, "smallest score of an accepted match"},
-        Field{
-            "full_share", &S::full_share, 0.0, 1.0,
-            "inliers count in full where they are this part of the features amid them, and by the "
-            "root of the part where it is less; 0 = always"},
+        Field{"full_share", &S::full_share, 0.0, 1.0,
+              "inliers count in full where they are this share of the features amid them, and by "
+              "sqrt(share / full_share) where they are less; 0 = always"},
         Field{"full_steps", &S::full_steps, 1, 1'000'000,
               "inliers count in full once the map holds so many changes of view, and before by its "
               "logarithm; 1 = always"},
         Field{"full_view_inliers", &S::full_view_inliers, 1, 1'000'000,
-              "inliers count in full where a view shares no more distinct ones with the change of "
-              "view before, and by so much less, though at least by half, where it shares more"},
+              "inliers count in full where a view shares at most so many distinct ones with the "
+              "change of view before, and full_view_inliers / n, but at least half, where it is n"},
         switch_field("distinctness", &S::distinctness,
                      "an inlier counts less if other places have it, too"),
         Field{"chance_evidence", &S::chance_evidence, 0.0, 1000.0,

@@ -45,7 +45,8 @@ struct RetrievalOptions {
         Field{"shift_tolerance_columns", &S::shift_tolerance_columns, 0, 32,
               "contents are compared shifted by up to so many of 64 columns, in steps of 2"},
         Field{"min_spacing", &S::min_spacing, 1, 1000,
-              "candidates are at least so many places apart"},
+              "places that look alike are at least so many apart; also how far beside a followed "
+              "way or the best candidate places are looked at"},
         Field{"max_count_difference", &S::max_count_difference, 0, 4096,
               "a candidate's |O| differs from the query's by at most so many pixels; 4096 = any"},
         Field{"max_center_distance_px", &S::max_center_distance_px, 0.0, kMaxCenterDistance_px,

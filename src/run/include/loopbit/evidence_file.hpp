@@ -23,8 +23,7 @@ struct StoredEvidence {
 };
 
 /// Writes evidence.db, a SQLite file with a row a frame; see docs/run_folder.md. After a crash it
-/// opens with all but the last second's frames or so. Throws Error (kind output). About 10 KB and 1
-/// ms a frame.
+/// opens with all but the last 32 frames. Throws Error (kind output). About 10 KB and 1 ms a frame.
 class EvidenceWriter {
  public:
   explicit EvidenceWriter(const std::string& path);
