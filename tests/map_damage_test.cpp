@@ -145,6 +145,21 @@ TEST_F(MapDamage, AMapWithoutItsFirstPageIsRecovered) {
   expect_only_true_places(recovered);
 }
 
+TEST_F(MapDamage, WhatIsNoMapIsNotRecovered) {
+  Random random;
+  std::string noise(100'000, '\0');
+  for (char& byte : noise) byte = static_cast<char>(random.between(0, 255));
+  change(path("other.db"), "CREATE TABLE stranger (x); INSERT INTO stranger VALUES (1)");
+  for (const std::string& file :
+       {write("noise.db", noise), write("zeros.db", std::string(100'000, '\0')),
+        write("short.db", "no map"), path("other.db"), path("none.db")}) {
+    expect_error(ErrorKind::input, {file}, [&] { recover_map(file, path("new.db")); });
+    for (const char* left : {"new.db", "new.db.part", "new.db.lock"}) {
+      EXPECT_FALSE(fs::exists(path(left))) << file << " leaves " << left;
+    }
+  }
+}
+
 /// A limit on the size of files, as a full disk would be.
 class FullDisk {
  public:
@@ -185,6 +200,16 @@ TEST_F(MapDamage, AFullDiskIsToldAndCostsNothingSaved) {
   expect_only_true_places(map);
   EXPECT_TRUE(check_map(path("map.db")).damage.empty());
   add_session(path("map.db"), 3, "fourth");
+}
+
+TEST_F(MapDamage, ARecoveryThatFindsNoSpaceLeavesNothing) {
+  {
+    const FullDisk disk(fs::file_size(path("map.db")) / 2);
+    expect_error(ErrorKind::output, {path("new.db")},
+                 [&] { recover_map(path("map.db"), path("new.db")); });
+  }
+  EXPECT_FALSE(fs::exists(path("new.db")));
+  EXPECT_EQ(recover_map(path("map.db"), path("new.db")).places, kFrames);
 }
 
 TEST_F(MapDamage, AMapThatCannotBeMadeIsNamed) {

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include <unistd.h>
+
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_tools.hpp"
 
@@ -139,6 +141,24 @@ TEST_F(MapFile, ASecondWriterIsRefusedUntilTheFirstEnds) {
   EXPECT_EQ(second.session(), 2);
 }
 
+TEST_F(MapFile, ALinkIsTheMapThatItNames) {
+  fs::create_directory(path("real"));
+  fs::create_symlink("real/map.db", path("link.db"));
+  fs::create_symlink("link.db", path("again.db"));
+  const std::string names[] = {path("real/map.db"), path("link.db"), path("again.db"),
+                               path("real/../real/map.db")};
+  for (const std::string& first : names) {  // the first one makes the map
+    MapWriter map(first, fast_options(), "first");
+    add_frame(map, 0);
+    for (const std::string& second : names) {
+      expect_error(ErrorKind::output, {second, "being written"},
+                   [&] { const MapWriter refused(second, fast_options(), "second"); });
+    }
+    map.finish();
+    fs::remove(path("real/map.db"));
+  }
+}
+
 TEST_F(MapFile, AMapMadeWithOtherSettingsIsRefused) {
   add_session(map_path_, 1);
   LoopDetectorOptions options = fast_options();
@@ -164,6 +184,45 @@ TEST_F(MapFile, OtherFilesAreRefused) {
                [&] { const MapReader map(path("other.db")); });
 }
 
+TEST_F(MapFile, PathsThatLeadNowhereAreNamed) {
+  fs::create_symlink("loop.db", path("loop.db"));
+  const std::string long_name = path(std::string(300, 'x'));
+  for (const std::string& name : {path("loop.db"), long_name}) {
+    expect_error(ErrorKind::input, {name, "cannot be read", "path"},
+                 [&] { const MapReader map(name); });
+    expect_error(ErrorKind::output, {name},
+                 [&] { const MapWriter map(name, fast_options(), "drive"); });
+    expect_error(ErrorKind::input, {name}, [&] { recover_map(name, path("new.db")); });
+  }
+}
+
+/// Not the superuser, who may read everything, as long as this lives.
+class OrdinaryUser {
+ public:
+  OrdinaryUser() { become(getuid() == 0 ? 65534 : getuid()); }
+  ~OrdinaryUser() { become(getuid()); }
+  OrdinaryUser(const OrdinaryUser&) = delete;
+  OrdinaryUser& operator=(const OrdinaryUser&) = delete;
+  OrdinaryUser(OrdinaryUser&&) = delete;
+  OrdinaryUser& operator=(OrdinaryUser&&) = delete;
+
+ private:
+  static void become(uid_t user) { EXPECT_EQ(seteuid(user), 0); }
+};
+
+TEST_F(MapFile, AMapThatMayNotBeReadIsNotCalledDamaged) {
+  add_session(map_path_, 1);
+  fs::permissions(fs::path(map_path_).parent_path(), fs::perms::all);
+  fs::permissions(map_path_, fs::perms::none);
+  const OrdinaryUser user;
+  const auto words = {std::string_view(map_path_), std::string_view("Permission denied"),
+                      std::string_view("the permissions of the file")};
+  expect_error(ErrorKind::input, words, [&] { const MapReader map(map_path_); });
+  expect_error(ErrorKind::input, words, [&] { recover_map(map_path_, path("new.db")); });
+  expect_error(ErrorKind::output, words,
+               [&] { const MapWriter map(map_path_, fast_options(), "drive"); });
+}
+
 TEST_F(MapFile, ANewerVersionIsRefused) {
   add_session(map_path_, 1);
   change(map_path_, "PRAGMA user_version = 3");
@@ -171,6 +230,8 @@ TEST_F(MapFile, ANewerVersionIsRefused) {
   expect_error(ErrorKind::input, words, [&] { const MapReader map(map_path_); });
   expect_error(ErrorKind::input, words,
                [&] { const MapWriter map(map_path_, fast_options(), "drive"); });
+  expect_error(ErrorKind::input, words, [&] { recover_map(map_path_, path("new.db")); });
+  EXPECT_FALSE(fs::exists(path("new.db")));
 }
 
 TEST_F(MapFile, StrangeTablesAreRefused) {

@@ -138,6 +138,33 @@ TEST_F(MapSession, PlacesWithoutTheirFeaturesAreNeverMatched) {
   EXPECT_EQ(map->damage().size(), 1U);
 }
 
+TEST_F(MapSession, AMapServesOneDetector) {
+  drive(0, kLap - 1);
+  const auto reader = std::make_shared<MapReader>(path("map.db"));
+  const LoopDetector asked(fast_options(), reader);
+  expect_error(ErrorKind::option, {"map.db", "has a detector"},
+               [&] { LoopDetector(fast_options(), reader); });
+  const auto writer = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+  LoopDetector continued(fast_options(), writer);
+  expect_error(ErrorKind::option, {"map.db", "has a detector"},
+               [&] { LoopDetector(fast_options(), writer); });
+  EXPECT_EQ(continued.process(view(9, {4, 0})).earlier_match, (SessionFrame{1, 9}));
+}
+
+TEST_F(MapSession, FeaturesFoundLostDuringASessionAreTold) {
+  drive(0, kLap - 1);
+  change(path("map.db"), "UPDATE features SET checksum = 0 WHERE place = 8");
+  const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+  LoopDetector detector(fast_options(), map);
+  EXPECT_TRUE(map->damage().empty());  // no features are read yet
+  EXPECT_NE(detector.process(view(7, {4, 0})).status, Status::loop);
+  EXPECT_EQ(detector.process(view(9, {4, 0})).earlier_match, (SessionFrame{1, 9}));
+  map->finish();
+  ASSERT_EQ(map->damage().size(), 1U);
+  EXPECT_NE(map->damage()[0].find("place 8 (session 1, frame 7)"), std::string::npos);
+  EXPECT_EQ(MapReader(path("map.db")).sessions().size(), 2U);
+}
+
 TEST_F(MapSession, MatchesSupportEachOtherWithinASessionOnly) {
   const auto last_session = [&](const std::string& map, std::initializer_list<int> ends) {
     int first = 0;

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "map_support.hpp"
 #include "test_support.hpp"
@@ -76,6 +78,15 @@ TEST_F(MapTools, OfADamagedMapNothingIsMerged) {
   EXPECT_EQ(places_of(path("a.db")).size(), 3U);
 }
 
+TEST_F(MapTools, IntoAMapWithALostSessionNothingIsMerged) {
+  add_session(path("a.db"), 3);
+  merge_map(path("b.db"), path("a.db"));
+  change(path("b.db"), "UPDATE session SET name = 'changed'");
+  expect_error(ErrorKind::input, {path("b.db"), "session 1", "--recover"},
+               [&] { merge_map(path("b.db"), path("a.db")); });
+  EXPECT_EQ(places_of(path("b.db")).size(), 3U);
+}
+
 TEST_F(MapTools, DroppingASessionForgetsItAndNoOther) {
   const std::string map_path = path("a.db");
   add_session(map_path, 200, "first");
@@ -93,6 +104,36 @@ TEST_F(MapTools, DroppingASessionForgetsItAndNoOther) {
   expect_only_true_places(map);
   expect_error(ErrorKind::option, {map_path, "session 7"},
                [&] { compact_map(map_path, {.drop_sessions = {7}}); });
+}
+
+TEST_F(MapTools, ASessionThatIsNamedTwiceIsDroppedOnce) {
+  add_session(path("a.db"), 3, "first");
+  add_session(path("a.db"), 4, "second");
+  const CompactCounts counts = compact_map(path("a.db"), {.drop_sessions = {1, 2, 1}});
+  EXPECT_EQ(counts.places_after, 0);
+  EXPECT_TRUE(MapReader(path("a.db")).sessions().empty());
+}
+
+TEST_F(MapTools, CompactingKeepsLinkModeAndOwner) {
+  constexpr uid_t kSomebody = 1234;
+  const bool is_root = geteuid() == 0;
+  fs::create_directory(path("real"));
+  const std::string real = path("real/a.db");
+  add_session(real, 200, "first");
+  add_session(real, 5, "second");
+  fs::create_symlink("real/a.db", path("link.db"));
+  fs::permissions(real, fs::perms::owner_read | fs::perms::owner_write);
+  if (is_root) {
+    ASSERT_EQ(chown(real.c_str(), kSomebody, kSomebody), 0);
+  }
+  const CompactCounts counts = compact_map(path("link.db"), {.drop_sessions = {1}});
+  EXPECT_TRUE(fs::is_symlink(path("link.db")));
+  EXPECT_EQ(fs::file_size(real), counts.bytes_after);
+  EXPECT_EQ(places_of(real).size(), 5U);
+  EXPECT_EQ(fs::status(real).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+  struct stat now {};
+  ASSERT_EQ(stat(real.c_str(), &now), 0);
+  EXPECT_EQ(now.st_uid, is_root ? kSomebody : geteuid());
 }
 
 TEST_F(MapTools, NumbersAreNeverGivenTwice) {

@@ -2,20 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "shared_map.hpp"
 
-#include <fmt/format.h>
-
-#include "loopbit/error.hpp"
-
 namespace loopbit::python {
 
 void SharedMap::for_each_earlier_place(const Visit& visit) {
   const auto guard = lock();
-  if (has_detector_) {
-    throw Error(
-        ErrorKind::option,
-        fmt::format("map is '{}', which has a detector; open it again for another one.", path_));
-  }
-  has_detector_ = true;
   storage().for_each_earlier_place(visit);
 }
 

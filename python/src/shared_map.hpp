@@ -25,7 +25,6 @@ class SharedMap : public MapStorage {
   /// What a detector of the map must be given; nothing if the map does not say.
   [[nodiscard]] virtual std::optional<LoopDetectorOptions> options() const = 0;
 
-  /// Throws Error (kind option) from the second call on: a map numbers its places for one detector.
   void for_each_earlier_place(const Visit& visit) final;
   void for_each_earlier_loop(const VisitLoop& visit) final;
   std::shared_ptr<const Features> features(PlaceId place) final;
@@ -39,7 +38,6 @@ class SharedMap : public MapStorage {
   [[nodiscard]] virtual MapStorage& storage() = 0;
 
   std::string path_;
-  bool has_detector_ = false;
   mutable std::mutex mutex_;
 };
 

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/database.hpp"
 
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -21,6 +23,20 @@ constexpr int kBusyTimeout_ms = 10'000;
 bool is_damage(int result) {
   const int primary = result & 0xff;
   return primary == SQLITE_CORRUPT || primary == SQLITE_NOTADB || primary == SQLITE_IOERR;
+}
+
+/// Of the last failure: not for want of space.
+bool is_forbidden(sqlite3* handle) {
+  const int result = sqlite3_errcode(handle);
+  return result == SQLITE_READONLY || result == SQLITE_PERM ||
+         (result == SQLITE_CANTOPEN && sqlite3_system_errno(handle) != ENOSPC);
+}
+
+/// Of the last failure: the system's own words where a file could not be opened.
+const char* reason_of(sqlite3* handle) {
+  const int system_error = sqlite3_system_errno(handle);
+  const bool unopened = sqlite3_errcode(handle) == SQLITE_CANTOPEN && system_error != 0;
+  return unopened ? std::strerror(system_error) : sqlite3_errmsg(handle);
 }
 
 }  // namespace
@@ -60,15 +76,18 @@ std::int64_t Database::integer(const std::string& sql) const {
 }
 
 void Database::fail() const {
-  const char* reason = handle_ ? sqlite3_errmsg(handle()) : "out of memory";
+  const char* reason = handle_ ? reason_of(handle()) : "out of memory";
   const int code = handle_ ? sqlite3_errcode(handle()) : SQLITE_NOMEM;
   const bool unusable = code == SQLITE_CORRUPT || code == SQLITE_NOTADB;
-  if (access_ == Access::create && !unusable) {
-    throw Error(ErrorKind::output,
-                fmt::format("'{}' cannot be written ({}): {}.", path_, reason, remedies_.write));
+  const bool writes = access_ == Access::create && !unusable;
+  std::string remedy = writes ? remedies_.write : remedies_.read;
+  if (code == SQLITE_BUSY) remedy = "another program holds it; wait until that ends, or end it";
+  if (handle_ && is_forbidden(handle())) {
+    remedy = "check the path, and the permissions of the file and of its folder";
   }
-  throw Error(ErrorKind::input,
-              fmt::format("'{}' cannot be read ({}): {}.", path_, reason, remedies_.read));
+  throw Error(writes ? ErrorKind::output : ErrorKind::input,
+              fmt::format("'{}' cannot be {} ({}): {}.", path_, writes ? "written" : "read", reason,
+                          remedy));
 }
 
 Statement::Statement(const Database& database, const std::string& sql) : database_(database) {

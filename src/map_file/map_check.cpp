@@ -98,7 +98,6 @@ class RepairedCopy {
 MapCheck copy_to_new(MapReader& source, const std::string& to) {
   const CopyPlan plan{.sessions = all_sessions(source),
                       .keeps_place = [](const MapPlace&) { return true; }};
-  const WriterLock lock(to);
   const Database database = open_map_for_writing(to);
   MapCheck counts = copy_whole(source, plan, database);
   counts.damage = source.damage();
@@ -129,6 +128,23 @@ bool can_be_opened(const std::string& path) {
   } catch (const Error&) {
     return false;
   }
+}
+
+MapCheck recover_to_new(const std::string& from, const std::string& to) {
+  std::error_code error;
+  const bool has_page = fs::file_size(from, error) >= kMapPageBytes && !error;
+  if (is_newer_map(from) || can_be_opened(from) || !has_page) {
+    MapReader source(from);
+    return copy_to_new(source, to);
+  }
+  const RepairedCopy copy(to + ".part");
+  copy.make(from, kMapVersion);
+  // Another page is where images begin, or there are none.
+  if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
+  MapReader source(copy.path());
+  MapCheck check = copy_to_new(source, to);
+  check.damage.insert(check.damage.begin(), "the file: its first page cannot be read");
+  return check;
 }
 
 }  // namespace
@@ -167,21 +183,22 @@ MapCheck check_map(const std::string& path) {
 }
 
 MapCheck recover_map(const std::string& from, const std::string& to) {
-  if (fs::exists(to)) {
+  const WriterLock lock(to);
+  std::error_code error;
+  if (fs::exists(to, error)) {
     throw Error(ErrorKind::output, fmt::format("'{}' exists; name a new file to recover to.", to));
   }
-  if (can_be_opened(from) || !fs::is_regular_file(from) || fs::file_size(from) < kMapPageBytes) {
-    MapReader source(from);
-    return copy_to_new(source, to);
+  try {
+    MapCheck check = recover_to_new(from, to);
+    if (check.sessions > 0 || check.damage.empty()) return check;
+    throw Error(ErrorKind::input, fmt::format("Nothing of '{}' can be recovered: it is no map of "
+                                              "loopbit's, or no session in it is whole; use a "
+                                              "copy from before.",
+                                              from));
+  } catch (const Error&) {
+    remove_database(to);
+    throw;
   }
-  const RepairedCopy copy(to + ".part");
-  copy.make(from, kMapVersion);
-  // Another page is where images begin, or there are none.
-  if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
-  MapReader source(copy.path());
-  MapCheck check = copy_to_new(source, to);
-  check.damage.insert(check.damage.begin(), "the file: its first page cannot be read");
-  return check;
 }
 
 }  // namespace loopbit

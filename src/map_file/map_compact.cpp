@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <cerrno>
 #include <filesystem>
 #include <map>
 #include <set>
@@ -7,10 +8,14 @@
 #include <utility>
 #include <vector>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "loopbit/error.hpp"
 #include "loopbit/map_tools.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "map_copy.hpp"
 #include "map_schema.hpp"
@@ -55,7 +60,7 @@ std::set<std::int64_t> remaining(MapReader& map, const CompactOptions& options) 
 
 std::vector<MapSession> sessions_but(const MapReader& map, const std::vector<int>& dropped) {
   std::vector<MapSession> sessions = map.sessions();
-  for (const int number : dropped) {
+  for (const int number : std::set<int>(dropped.begin(), dropped.end())) {
     const auto removed = std::erase_if(
         sessions, [&](const MapSession& session) { return session.session == number; });
     if (removed == 0) {
@@ -79,6 +84,24 @@ void keep_sequences(const Database& from, const Database& to) {
   }
 }
 
+/// Makes the empty file `part` with the mode of the one at `path`, and its owner and group as far
+/// as that is permitted.
+void make_alike(const std::string& part, const std::string& path) {
+  constexpr mode_t kOwnerOnly = 0600;
+  constexpr mode_t kAllModes = 07777;
+  const int file = open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnerOnly);
+  if (file < 0) throw cannot_write(part, errno);
+  struct stat old {};
+  const bool is_alike = stat(path.c_str(), &old) == 0 && fchmod(file, old.st_mode & kAllModes) == 0;
+  const int reason = errno;
+  // Only root gives files away; others may give them to a group of theirs.
+  const bool is_given = is_alike && (fchown(file, old.st_uid, old.st_gid) == 0 ||
+                                     fchown(file, geteuid(), old.st_gid) == 0);
+  (void)is_given;
+  close(file);
+  if (!is_alike) throw cannot_write(part, reason);
+}
+
 /// Writes what remains of the map at `path` to the new file `part`.
 void write_compact(const std::string& path, const std::string& part, const CompactOptions& options,
                    CompactCounts& counts) {
@@ -90,6 +113,7 @@ void write_compact(const std::string& path, const std::string& part, const Compa
   plan.keeps_place = [&](const MapPlace& place) { return kept.contains(place.id); };
   map.for_each_place([&](const MapPlace&) { ++counts.places_before; });
   const Database old = open_map_for_reading(path);
+  make_alike(part, path);
   const Database compact = open_map_for_writing(part);
   counts.places_after = copy_whole(map, plan, compact).places;
   refuse_damaged(map.path(), map.damage());
@@ -111,21 +135,22 @@ void check_unused(const std::string& path) {
 
 CompactCounts compact_map(const std::string& path, const CompactOptions& options) {
   const WriterLock lock(path);
-  const std::string part = path + ".compact";
+  const std::string file = resolved_path(path);
+  const std::string part = file + ".compact";
   remove_database(part);
   CompactCounts counts;
   try {
     write_compact(path, part, options, counts);
     check_unused(path);
+    std::error_code error;
+    counts.bytes_before = fs::file_size(file, error);
+    if (!error) counts.bytes_after = fs::file_size(part, error);
+    if (!error) fs::rename(part, file, error);
+    if (error) throw cannot_write(path, error.value());
   } catch (const Error&) {
     remove_database(part);
     throw;
   }
-  counts.bytes_before = fs::file_size(path);
-  counts.bytes_after = fs::file_size(part);
-  std::error_code error;
-  fs::rename(part, path, error);
-  if (error) throw cannot_write(path, error.value());
   return counts;
 }
 

@@ -110,6 +110,7 @@ std::vector<std::string> MapReader::check_structure() const {
 }
 
 void MapReader::for_each_earlier_place(const Visit& visit) {
+  impl_->stored.begin(impl_->path);
   for_each_place([&](const MapPlace& place) {
     impl_->stored.add(place.id, place.at);
     visit(place.at, place.content);
@@ -150,7 +151,7 @@ class MapWriter::Impl {
   }
 
   void for_each_earlier_place(const Visit& visit) {
-    (void)stored();  // not after finish()
+    stored().begin(database_->path());
     for_each_place(
         *database_,
         [&](const MapPlace& place) {
@@ -186,6 +187,7 @@ class MapWriter::Impl {
   }
 
   [[nodiscard]] int session() const { return session_; }
+  [[nodiscard]] const Damage& damage() const { return damage_; }
   [[nodiscard]] BatchWriter& writer() const { return *writer_; }
 
  private:
@@ -249,6 +251,7 @@ int MapWriter::session() const { return impl_->session(); }
 std::int64_t MapWriter::saved_frames() const { return impl_->writer().saved_frames(); }
 void MapWriter::flush() { impl_->writer().flush(); }
 void MapWriter::finish() { impl_->finish(); }
+const std::vector<std::string>& MapWriter::damage() const { return impl_->damage().clauses(); }
 
 void MapWriter::for_each_earlier_place(const Visit& visit) { impl_->for_each_earlier_place(visit); }
 void MapWriter::for_each_earlier_loop(const VisitLoop& visit) {

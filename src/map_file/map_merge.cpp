@@ -31,6 +31,7 @@ MergePlan plan_of(const std::string& into, const Database& to, const MapReader& 
     known[session.uid] = session.session;
     options = session.options;
   }
+  refuse_damaged(into, damage.clauses());  // a session of unknown uid would be added twice
   MergePlan plan;
   int next = next_session(to);
   for (const MapSession& session : source.sessions()) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <filesystem>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -51,6 +52,21 @@ Database::Remedies remedies(const std::string& path) {
           .read = fmt::format("it is no map of loopbit's, or damaged; 'loopbit map check {} "
                               "--recover NEW.db' saves what is left of a damaged one",
                               path)};
+}
+
+/// Throws Error (kind input) if there is no file, or the system does not say.
+void check_is_file(const std::string& path) {
+  std::error_code error;
+  const auto type = std::filesystem::status(path, error).type();
+  if (type == std::filesystem::file_type::regular) return;
+  if (type == std::filesystem::file_type::none) {
+    throw Error(ErrorKind::input, fmt::format("'{}' cannot be read ({}): check the path and the "
+                                              "permissions of its folder.",
+                                              path, error.message()));
+  }
+  throw Error(
+      ErrorKind::input,
+      fmt::format("There is no map '{}'; 'loopbit run INPUT --map {}' makes one.", path, path));
 }
 
 [[noreturn]] void refuse(const Database& database, const std::string& why) {
@@ -136,16 +152,20 @@ bool close_log(const Database& database) {
 }
 
 Database open_map_for_reading(const std::string& path) {
-  if (!std::filesystem::is_regular_file(path)) {
-    throw Error(
-        ErrorKind::input,
-        fmt::format("There is no map '{}'; 'loopbit run INPUT --map {}' makes one.", path, path));
-  }
+  check_is_file(path);
   Database database(path, Database::Access::read, remedies(path));
   const int version = checked_version(database);
   if (version == 0) refuse(database, "is empty; 'loopbit run INPUT --map' fills it");
   check_tables(database, version);
   return database;
+}
+
+bool is_newer_map(const std::string& path) {
+  check_is_file(path);
+  const Database database(path, Database::Access::read, remedies(path));
+  Statement id(database, "PRAGMA application_id");
+  return id.step_if_readable() == Statement::Step::row && id.integer(0) == kMapApplicationId &&
+         database.integer("PRAGMA user_version") > kMapVersion;
 }
 
 }  // namespace loopbit

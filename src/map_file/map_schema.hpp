@@ -34,4 +34,8 @@ bool close_log(const Database& database);
 /// Opens a map to be read, beside a writer or without. Throws as above, kind input.
 Database open_map_for_reading(const std::string& path);
 
+/// Whether the map is of a newer version; not if its first page is damaged. Throws Error (kind
+/// input) if there is no file, it may not be read or another program holds it.
+bool is_newer_map(const std::string& path);
+
 }  // namespace loopbit

@@ -4,7 +4,20 @@
 
 #include <utility>
 
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
 namespace loopbit {
+
+void StoredFeatures::begin(const std::string& path) {
+  if (has_begun_) {
+    throw Error(
+        ErrorKind::option,
+        fmt::format("map is '{}', which has a detector; open it again for another one.", path));
+  }
+  has_begun_ = true;
+}
 
 std::shared_ptr<const Features> StoredFeatures::get(PlaceId place, Damage& damage) {
   if (auto cached = cache_.find(place)) return cached;

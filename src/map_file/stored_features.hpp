@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "loopbit/database.hpp"
@@ -19,6 +20,10 @@ class StoredFeatures {
  public:
   explicit StoredFeatures(const Database& database)
       : reader_(database), cache_(kFeatureCacheBytes) {}
+
+  /// To be called before add(). Throws Error (kind option) the second time: the places of the map
+  /// at `path` are numbered for one detector.
+  void begin(const std::string& path);
 
   /// Gives the row `id`, a place of `at`, the next number.
   void add(std::int64_t id, const SessionFrame& at) { places_.push_back({id, at}); }
@@ -41,6 +46,7 @@ class StoredFeatures {
     SessionFrame at;
   };
 
+  bool has_begun_ = false;
   FeatureReader reader_;
   FeatureCache cache_;
   std::vector<StoredPlace> places_;

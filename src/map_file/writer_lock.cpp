@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/write_file.hpp"
 
 namespace loopbit {
 namespace {
@@ -25,7 +26,7 @@ bool is_still_at(const std::string& path, int file) {
 
 }  // namespace
 
-WriterLock::WriterLock(const std::string& map_path) : path_(map_path + ".lock") {
+WriterLock::WriterLock(const std::string& map_path) : path_(resolved_path(map_path) + ".lock") {
   constexpr mode_t kMode = 0666;  // less what umask takes
   do {
     if (file_ >= 0) close(file_);

@@ -6,8 +6,9 @@
 
 namespace loopbit {
 
-/// The right to write one map, for as long as this lives. Held on a file `MAP.lock` beside it by
-/// flock(2): the system gives it up when a process ends, however it ends, so none is ever stale.
+/// The right to write one map, for as long as this lives. Held on a file `MAP.lock` beside it,
+/// through all symbolic links, by flock(2): the system gives it up when a process ends, however it
+/// ends, so none is ever stale.
 class WriterLock {
  public:
   /// Throws Error (kind output) if another process, or this one, writes the map, or the file cannot

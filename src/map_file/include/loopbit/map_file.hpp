@@ -110,7 +110,7 @@ class MapReader : public MapStorage {
 
   [[nodiscard]] const std::string& path() const;
 
-  // For LoopDetector::query; add() throws Error (kind option).
+  // For the queries of one LoopDetector: that of another throws Error (kind option), as add() does.
   void for_each_earlier_place(const Visit& visit) override;
   void for_each_earlier_loop(const VisitLoop& visit) override;
   std::shared_ptr<const Features> features(PlaceId place) override;
@@ -161,9 +161,15 @@ class MapWriter : public MapStorage {
   /// afterwards: what it asks for throws Error (kind option).
   void finish();
 
-  /// Throws Error (kind input) where a place is damaged: a damaged map is not written to.
+  /// What features() found damaged so far, as MapReader::damage says it.
+  [[nodiscard]] const std::vector<std::string>& damage() const;
+
+  /// For one LoopDetector: the first throws Error (kind option) when it is called again.
+  /// These two throw Error (kind input) where a session, place or loop is damaged: such a map is
+  /// not written to.
   void for_each_earlier_place(const Visit& visit) override;
   void for_each_earlier_loop(const VisitLoop& visit) override;
+  /// Without any if they are lost: found only now, so the session goes on, and damage() says it.
   std::shared_ptr<const Features> features(PlaceId place) override;
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& image) override;

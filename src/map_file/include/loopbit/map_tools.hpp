@@ -37,8 +37,8 @@ MergeCounts merge_map(const std::string& into, const std::string& from);
 
 /// Copies what is whole of a damaged map to a new one, under the same numbers. A session whose
 /// description is lost is called "recovered". A map that version 1 began loses its images with its
-/// first page. Throws Error: kind output if `to` exists or cannot be written, input if not even the
-/// tables can be found.
+/// first page. Throws Error: kind output if `to` exists or cannot be written, input if there is
+/// nothing to copy or `from` is of a newer version. What fails leaves no file.
 MapCheck recover_map(const std::string& from, const std::string& to);
 
 struct CompactOptions {
