@@ -217,6 +217,101 @@ class CommandLineTest(CommandTest):
         self.assert_fails(bad, 2, "LOOPBIT_KERNEL")
         self.assertEqual((self.out / "loops.csv").read_bytes(), before)
 
+    def test_a_data_set_is_no_earlier_run(self):
+        folder = self.scratch / "town"
+        folder.mkdir()
+        truth = pathlib.Path(shutil.copy(self.dataset / "truth.csv", folder))
+        ran = loopbit("run", self.few_images(), "--out", folder, "--no-report", "--truth", truth,
+                      "--overwrite")
+        self.assert_fails(ran, 4, folder, "truth.csv")
+        self.assertEqual(truth.read_bytes(), (self.dataset / "truth.csv").read_bytes())
+        self.assertEqual(list(folder.iterdir()), [truth])
+
+    def test_what_a_run_reads_is_not_replaced_by_it(self):
+        few = self.few_images()
+        truth = self.dataset / "truth.csv"
+        run = ["run", few, "--out", self.out, "--no-report", "--truth"]
+        self.assertEqual(loopbit(*run, truth).returncode, 0)
+        own = self.out / "truth.csv"
+        before = own.read_bytes()
+        self.assert_fails(loopbit(*run, own, "--overwrite"), 4, own)
+        self.assertEqual(own.read_bytes(), before)
+        self.assertTrue((self.out / "loops.csv").exists())
+        self.assertEqual(loopbit(*run, truth, "--overwrite").returncode, 0)
+
+    def test_an_input_without_an_image_leaves_an_earlier_run_alone(self):
+        self.assertEqual(loopbit("run", self.few_images(3), "--out", self.out).returncode, 0)
+        before = (self.out / "loops.csv").read_bytes()
+        bad = self.scratch / "bad"
+        bad.mkdir()
+        (bad / "1.png").write_bytes(b"")
+        ran = loopbit("run", bad, "--out", self.out, "--overwrite")
+        self.assert_fails(ran, 3, bad, "1.png")
+        self.assertEqual((self.out / "loops.csv").read_bytes(), before)
+        shutil.copy(self.images / "000000.png", bad / "2.png")
+        ran = loopbit("run", bad, "--out", self.out, "--overwrite")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual([row["status"] for row in rows(self.out)],
+                         ["unreadable", "no_earlier_place"])
+
+    def test_a_stderr_that_cannot_be_written_ends_nothing(self):
+        bad = self.scratch / "bad"
+        bad.mkdir()
+        for number in range(20):
+            (bad / f"{number}.png").write_bytes(b"")
+        shutil.copy(self.images / "000000.png", bad / "20.png")
+        run = [LOOPBIT, "run", bad, "--no-report", "--out"]
+        missing = [LOOPBIT, "run", self.scratch / "none", "--out", self.out]
+        with open("/dev/full", "w") as full:
+            for name, options in {"full": {"stderr": full},
+                                  "closed": {"preexec_fn": lambda: os.close(2)}}.items():
+                with self.subTest(name):
+                    ran = subprocess.run([*run, self.scratch / name], stdin=subprocess.DEVNULL,
+                                         stdout=subprocess.DEVNULL, **options)
+                    self.assertEqual(ran.returncode, 0)
+                    lines = (self.scratch / name / "loops.csv").read_text().splitlines()
+                    self.assertEqual([lines[0], len(lines)], [HEADER, 22])
+                    self.assertEqual(subprocess.run(missing, **options).returncode, 3)
+
+    def test_a_stdout_that_cannot_be_written_is_an_error(self):
+        with open("/dev/full", "w") as full:
+            for name, options in {"full": {"stdout": full},
+                                  "closed": {"preexec_fn": lambda: os.close(1)}}.items():
+                for command in (["options"], ["options", "--json"], ["eval", self.reference],
+                                ["--version"]):
+                    with self.subTest(name, command=command):
+                        ran = subprocess.run([LOOPBIT, *command], stdin=subprocess.DEVNULL,
+                                             stderr=subprocess.PIPE, text=True, **options)
+                        self.assert_fails(ran, 4, "standard output")
+
+    def test_paths_need_not_be_utf8(self):
+        folder = os.fsencode(self.scratch) + b"/\xff"
+        os.rename(self.few_images(3), folder)
+        ran = subprocess.run([LOOPBIT, "run", folder, "--out", self.out], capture_output=True)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn("\ufffd", json.loads((self.out / "run.json").read_text())["input"]["path"])
+        os.rename(self.out, folder + b"_run")
+        ran = subprocess.run([LOOPBIT, "compare", "--json", folder + b"_run", folder + b"_run",
+                              "--truth", self.dataset / "truth.csv"], capture_output=True)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+
+    def test_times_are_needed_where_a_setting_is_in_seconds(self):
+        ran = loopbit("run", self.few_images(), "--out", self.out, "--set", "exclusion.seconds=5")
+        self.assert_fails(ran, 2, "exclusion.seconds is 5", "000000.png", "exclusion.frames")
+
+    def test_names_that_no_file_can_have(self):
+        loop = self.scratch / "loop"
+        loop.symlink_to(loop)
+        truth = ["--truth", self.dataset / "truth.csv"]
+        for name in (loop, self.scratch / ("x" * 300)):
+            for code, command in ((3, ["eval", name, *truth]), (3, ["eval", f"a={name}", *truth]),
+                                  (3, ["report", name]), (3, ["run", name, "--out", self.out]),
+                                  (4, ["run", self.images, "--out", name]),
+                                  (4, ["report", self.reference, "--out", name]),
+                                  (3, ["reproduce", name, "--out", self.out])):
+                with self.subTest(command=command):
+                    self.assert_fails(loopbit(*command), code, name)
+
     def test_output_folder_that_cannot_be_made(self):
         file = self.scratch / "file"
         file.write_text("")
@@ -282,6 +377,20 @@ class CommandLineTest(CommandTest):
                 ran = loopbit(*arguments)
                 self.assertEqual(ran.returncode, 2, ran.stderr)
                 self.assertTrue(ran.stderr)
+
+    def test_a_bad_command_line_names_what_is_wrong(self):
+        run = ["run", self.images, "--out", self.out]
+        for arguments, words in ((["walk"], "no command 'walk'"), (["--foo"], "no option '--foo'"),
+                                 (["map", "lst", "x.db"], "no command 'lst'"),
+                                 (["map", "--foo"], "no option '--foo'"),
+                                 ([*run, "--every", "2.5"], "'2.5' is no whole number from 1"),
+                                 ([*run, "--limit", "-1"], "'-1' is no whole number from 0"),
+                                 ([*run, "--pictures-mb", "nan"], "'nan' is no number from 0")):
+            with self.subTest(arguments):
+                ran = loopbit(*arguments)
+                self.assertEqual(ran.returncode, 2, ran.stderr)
+                self.assertIn(words, ran.stderr)
+        self.assertFalse(self.out.exists())
 
     def test_unknown_kernel(self):
         ran = loopbit("run", self.few_images(), "--out", self.out,

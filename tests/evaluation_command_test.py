@@ -148,6 +148,14 @@ class EvaluationCommandTest(CommandTest):
             with self.subTest(command=command):
                 self.assert_fails(loopbit(*command), code, *words)
 
+    def test_all_of_the_truth_is_read_before_a_run(self):
+        poses = ["run", self.images, "--out", self.out, "--truth", self.dataset / "poses.txt"]
+        missing = self.scratch / "missing.csv"
+        self.assert_fails(loopbit(*poses, "--ignore", missing), 3, missing)
+        self.assert_fails(loopbit(*poses, "--not-false", missing), 3, missing)
+        self.assert_fails(loopbit(*poses, "--protocol", "ibow-lcd"), 2, "ibow-lcd", "poses")
+        self.assertFalse(self.out.exists())
+
     def test_a_truth_that_fits_no_frame_costs_no_run(self):
         short = self.scratch / "short.mat"
         write_mat(short, "truth", 3, [(2, 0)])

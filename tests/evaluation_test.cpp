@@ -3,6 +3,8 @@
 #include "loopbit/evaluation.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 #include <set>
 
 #include <nlohmann/json.hpp>
@@ -82,6 +84,14 @@ TEST(Evaluate, ToleranceIsCountedInFramesFromTheNearestTruePlace) {
   for (const int match : {9, 41}) {
     EXPECT_EQ(evaluate({{loop(100, match)}, {}}, truth, {10}).decision.wrong, 1) << match;
   }
+}
+
+TEST(Evaluate, TheGreatestFrameNumbersDoNotOverflow) {
+  constexpr int kLast = std::numeric_limits<int>::max();
+  const GroundTruth truth{{{40, 0, kLast}, {41, 1, kLast}}, {}, {}};
+  const Evaluation result = evaluate({{loop(40, kLast), loop(41, 0)}, {}}, truth, {2});
+  EXPECT_EQ(result.pairs.positives, (std::int64_t{1} << 32) - 1);
+  EXPECT_EQ(result.decision.right, 2);
 }
 
 TEST(Evaluate, TheBestMatchSpeaksForAQueryAndEveryPairForItself) {

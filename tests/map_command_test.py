@@ -3,7 +3,9 @@
 # SPDX-License-Identifier: MIT
 """Maps as a user meets them: loopbit run --map, query and map."""
 
+import concurrent.futures
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -107,6 +109,20 @@ class MapCommandTest(CommandTest):
         sessions = json.loads(loopbit("map", "list", path, "--json").stdout)
         self.assertEqual([s["places"] for s in sessions], [len(rows(self.out))])
 
+    def test_a_session_that_answered_nothing_leaves_its_folder_to_the_next(self):
+        path = self.scratch / "new.db"
+        run = ["run", self.few_images(), "--map", path, "--no-report"]
+        folder = self.scratch / "new_session_1"
+        folder.mkdir()
+        header, *answers = (self.made / "town_session_1/loops.csv").read_text().splitlines(True)
+        (folder / "loops.csv").write_text(header + answers[0])
+        self.assert_fails(loopbit(*run), 4, folder, "--overwrite")
+        self.assertEqual((folder / "loops.csv").read_text(), header + answers[0])
+        (folder / "loops.csv").write_text(header)
+        ran = loopbit(*run)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(len(rows(folder)), 14)
+
     # query
 
     def test_query_answers_in_a_table_and_in_json(self):
@@ -150,6 +166,23 @@ class MapCommandTest(CommandTest):
             watch.send_signal(signal.SIGINT)
             self.assertEqual(watch.wait(), 0)
 
+    def test_watch_goes_on_when_an_image_is_gone_before_it_is_read(self):
+        folder = self.few_images()
+        first, *others = sorted(folder.iterdir())
+        with subprocess.Popen([LOOPBIT, "query", self.map, "--watch", folder, "--json"],
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.DEVNULL, text=True) as watch:
+            self.assertEqual(json.loads(watch.stdout.readline())["image"], first.name)
+            for image in reversed(others):
+                image.unlink()
+            answers = [json.loads(watch.stdout.readline()) for _ in others]
+            self.assertIn(others[-1].name, answers[-1]["image"])
+            self.assertEqual(answers[-1]["status"], "unreadable")
+            shutil.copy(self.laps[0] / "000004.png", folder / "again.png")
+            self.assertEqual(json.loads(watch.stdout.readline())["status"], "loop")
+            watch.send_signal(signal.SIGINT)
+            self.assertEqual(watch.wait(), 0)
+
     # map
 
     def test_info_and_list(self):
@@ -174,6 +207,24 @@ class MapCommandTest(CommandTest):
         self.assertEqual(len(loops), len(edges.read_text().splitlines()) - 1)
         g2o = loopbit("map", "export", self.map, "--format", "g2o").stdout.splitlines()
         self.assertEqual(sum(line.startswith("EDGE_SE3:QUAT") for line in g2o), len(loops))
+
+    def test_an_export_replaces_no_link_and_no_pipe(self):
+        link, file, pipe = (self.scratch / name for name in ("link", "file.csv", "pipe"))
+        link.symlink_to(file.name)
+        export = ["map", "export", self.map, "--out"]
+        text = loopbit("map", "export", self.map).stdout
+        for _ in range(2):  # makes the file, then replaces it
+            self.assertEqual(loopbit(*export, link).returncode, 0)
+            self.assertTrue(link.is_symlink())
+            self.assertEqual(file.read_text(), text)
+            self.assertEqual(len(list(self.scratch.iterdir())), 2)
+        os.mkfifo(pipe)
+        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+        self.assertEqual(loopbit(*export, pipe).returncode, 0)
+        self.assertTrue(pipe.is_fifo())
+        self.assertEqual(os.read(reader, 1 << 16).decode(), text)
+        os.close(reader)
+        self.assert_fails(loopbit(*export, "/dev/full"), 4, "/dev/full", "space")
 
     def test_images_are_kept_shown_and_forgotten(self):
         path, shown, all_images = (self.scratch / name for name in ("kept.db", "shown", "all"))
@@ -237,6 +288,39 @@ class MapCommandTest(CommandTest):
         self.assertIn(f"{FRAMES - 1} places",
                       loopbit("map", "check", copy, "--recover", recovered).stdout)
         self.assertEqual(loopbit("map", "check", recovered).returncode, 0)
+
+    def test_damage_that_a_run_finds_is_told(self):
+        copy = self.copy_of_map()
+        with sqlite3.connect(copy) as database:
+            database.execute("UPDATE features SET checksum = 0 WHERE place < 10")
+        database.close()
+        ran = loopbit("run", self.few_images(), "--map", copy, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(ran.stderr.count("what is damaged was left out"), 1, ran.stderr)
+        self.assertRegex(ran.stderr, r"place \d \(session 1, frame \d\)")
+        self.assertIn(f"loopbit map check {copy}", ran.stderr)
+        self.assertEqual(len(json.loads(loopbit("map", "list", copy, "--json").stdout)), 3)
+
+    def test_a_map_that_another_program_holds_is_not_called_damaged(self):
+        copy, new = self.copy_of_map(), self.scratch / "new.db"
+        holder = sqlite3.connect(copy, isolation_level=None)
+        holder.execute("BEGIN EXCLUSIVE")
+        commands = {("map", "info", copy): 3,
+                    ("map", "check", copy, "--recover", new): 3,
+                    ("run", self.laps[0], "--map", copy, "--out", self.out): 4}
+        with concurrent.futures.ThreadPoolExecutor() as threads:  # each waits for ten seconds
+            results = list(threads.map(lambda command: loopbit(*command), commands))
+        holder.close()
+        for ran, code in zip(results, commands.values()):
+            self.assert_fails(ran, code, copy, "locked", "another program")
+            self.assertNotRegex(ran.stderr, "damaged|free space")
+        self.assertFalse(new.exists())
+
+    def test_what_is_no_map_is_not_recovered(self):
+        text, new = self.scratch / "text.db", self.scratch / "new.db"
+        text.write_text("no map " * 10000)
+        self.assert_fails(loopbit("map", "check", text, "--recover", new), 3, text, "copy")
+        self.assertFalse(new.exists())
 
     def test_files_that_are_no_maps_are_named(self):
         text = self.scratch / "text.db"

@@ -65,6 +65,20 @@ TEST_F(RunFolderTest, OverwritingKeepsOtherFiles) {
   EXPECT_FALSE(fs::exists(path("run/run.json")));
 }
 
+TEST_F(RunFolderTest, ReplacesNeitherADataSetNorWhatIsRead) {
+  const std::string truth = write("truth.csv", "5,1,2\n");
+  test::expect_error(ErrorKind::output, {path(""), "truth.csv", "no earlier run"},
+                     [&] { const RunFolder over(path(""), true); });
+  EXPECT_EQ(lines_of(truth), std::vector<std::string>{"5,1,2"});
+  { RunFolder(path("run"), false).write_truth({}); }
+  const std::string own = path("run/truth.csv");
+  test::expect_error(ErrorKind::output, {own, "is read"}, [&] {
+    const RunFolder over(path("run"), true, {"", own});
+  });
+  EXPECT_TRUE(fs::exists(own));
+  EXPECT_TRUE(fs::exists(path("run/loops.csv")));
+}
+
 TEST_F(RunFolderTest, AFolderThatCannotBeMadeIsNamed) {
   const std::string file = write("file", "");
   test::expect_error(ErrorKind::output, {file}, [&] { RunFolder(file + "/run", false); });
@@ -331,6 +345,18 @@ TEST(Run, BadFramesAreCountedAndTheRunGoesOn) {
   EXPECT_NE(told.sentences[2].find("frame 4"), std::string::npos);
 }
 
+TEST(Run, FramesWithoutTimesEndItWhereASettingIsInSeconds) {
+  auto list = frames(2);
+  list[0].timestamp_s.reset();
+  FrameSource source(list);
+  LoopDetectorOptions options;
+  options.exclusion.seconds = 5;
+  LoopDetector detector(options);
+  test::expect_error(ErrorKind::option, {"exclusion.seconds is 5", "frame 0"}, [&] {
+    run(source, detector, {[](const Detection&) {}, [](const std::string&) {}}, false);
+  });
+}
+
 TEST(Run, TheSizeIsThatOfTheFirstUsableFrame) {
   auto list = frames(3);
   list[0] = {"tiny.png", 0.0, cv::Mat1b(8, 8, std::uint8_t{0}), {}};
@@ -445,6 +471,7 @@ class FailingSource final : public ImageSource {
 };
 
 TEST(Prefetch, PassesErrorsOnInTheirPlace) {
+  EXPECT_THROW(prefetch(std::make_unique<FailingSource>(), 0), Error);
   const auto source = prefetch(std::make_unique<FailingSource>(), 8);
   Frame frame;
   EXPECT_TRUE(source->next(frame));

@@ -70,6 +70,7 @@ int demo_command(const DemoFlags& flags) {
   Session session;
   session.source = make_world_source(world);
   session.input = "demo";
+  session.truth_files = flags.truth.files();
   session.evaluation = flags.truth.evaluation();
   session.truth = [&](const FrameTimes& times_s) {
     const GroundTruth built_in{world->same_place(), world->near_place(), {}};

@@ -16,6 +16,7 @@
 #include "commands.hpp"
 #include "map_damage.hpp"
 #include "place_images.hpp"
+#include "ranges.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -235,7 +236,7 @@ void add_writers(CLI::App& map, const Flags& flags) {
       ->add_option("--budget", flags->compact.max_places,
                    "Keep at most so many places, those that others stand for least")
       ->type_name("PLACES")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{2'000'000'000}));
+      ->check(whole_number(1, 2'000'000'000));
   compact->add_flag("--drop-images", flags->compact.drop_images, "Forget the images of places");
   compact->callback([flags] { compact_command(flags->map, flags->compact); });
 }

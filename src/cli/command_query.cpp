@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 #include <chrono>
-#include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,7 +19,9 @@
 #include "commands.hpp"
 #include "map_damage.hpp"
 #include "place_images.hpp"
+#include "ranges.hpp"
 #include "stop_signal.hpp"
+#include "streams.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -104,16 +105,29 @@ class Relocalizer {
   }
 
   /// All images of `input`.
-  void ask(const std::string& input) {
-    const auto source = open_source(input);
-    for (Frame frame; source->next(frame);) answer(frame);
-    std::fflush(stdout);
+  void ask(const std::string& input) { answer_all(*open_source(input)); }
+
+  /// One image, which may be gone again.
+  void ask_arrived(const std::string& image) {
+    std::unique_ptr<ImageSource> source;
+    try {
+      source = open_source(image);
+    } catch (const Error& error) {
+      answer({image, {}, {}, error.what()});
+      return flush_stdout();
+    }
+    answer_all(*source);
   }
 
   [[nodiscard]] bool any_readable() const { return any_readable_; }
   [[nodiscard]] const MapReader& map() const { return *map_; }
 
  private:
+  void answer_all(ImageSource& source) {
+    for (Frame frame; source.next(frame);) answer(frame);
+    flush_stdout();
+  }
+
   void answer(const Frame& frame) {
     std::vector<RankedPlace> places;
     Status status = Status::unreadable;
@@ -123,7 +137,7 @@ class Relocalizer {
       any_readable_ = true;
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;
-      fmt::print(stderr, "loopbit: '{}': {}\n", frame.name, error.what());
+      tell(fmt::format("loopbit: '{}': {}\n", frame.name, error.what()));
     }
     if (places.size() > flags_.places) places.resize(flags_.places);
     std::vector<ShownPlace> shown;
@@ -152,7 +166,7 @@ int query_command(const QueryFlags& flags) {
     const auto& stop = stop_on_signal();
     FolderWatch watch(flags.watch);
     while (!stop) {
-      for (const std::string& image : watch.arrived()) relocalizer.ask(image);
+      for (const std::string& image : watch.arrived()) relocalizer.ask_arrived(image);
       std::this_thread::sleep_for(kWatchPause);
     }
   }
@@ -177,7 +191,7 @@ void add_query(CLI::App& app, int& exit_code) {
   command->add_option("--places", flags->places, "Show so many places an image, best first")
       ->type_name("N")
       ->capture_default_str()
-      ->check(CLI::Range(1, 1000));
+      ->check(whole_number(1, 1000));
   command
       ->add_option("--place-images", flags->place_images,
                    "A new folder for the images of the places shown, if the map keeps any")

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <system_error>
 
 #include <fmt/format.h>
 
@@ -36,8 +37,10 @@ void report_command(const ReportFlags& flags) {
     path = (std::filesystem::path(flags.run) / "report.html").string();
   }
   write_report(path, {run}, flags.report);
-  fmt::print("report     {} ({:.1f} MB)\n", path,
-             static_cast<double>(std::filesystem::file_size(path)) / 1e6);
+  std::error_code no_file;  // but a device or a pipe
+  const auto bytes = std::filesystem::file_size(path, no_file);
+  fmt::print("report     {}{}\n", path,
+             no_file ? "" : fmt::format(" ({:.1f} MB)", static_cast<double>(bytes) / 1e6));
   if (flags.open) open_page(path);
 }
 

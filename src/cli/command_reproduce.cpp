@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -76,7 +77,10 @@ std::string letters_and_digits(const std::string& name) {
 std::vector<fs::path> entries(const fs::path& folder) {
   std::vector<fs::path> paths;
   std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) paths.push_back(entry.path());
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    paths.push_back(entry->path());
+  }
   std::sort(paths.begin(), paths.end());
   return paths;
 }
@@ -87,7 +91,8 @@ std::optional<PublicSet> find_kitti(const fs::path& data, std::string_view seque
     const fs::path root = (data / below).lexically_normal();
     const fs::path images = root / "sequences" / sequence;
     const fs::path poses = root / "poses" / (std::string(sequence) + ".txt");
-    if (!fs::is_directory(images) || !fs::is_regular_file(poses)) continue;
+    std::error_code error;
+    if (!fs::is_directory(images, error) || !fs::is_regular_file(poses, error)) continue;
     PublicSet set;
     set.images = images.string();
     set.truth.truth = poses.string();
@@ -107,9 +112,10 @@ std::optional<PublicSet> find_fab_map_set(const fs::path& data, std::string_view
   for (const fs::path& folder : entries(data)) {
     if (letters_and_digits(folder.filename().string()) != name) continue;
     PublicSet set;
+    std::error_code error;
     for (const fs::path& entry : entries(folder)) {
       const std::string entry_name = letters_and_digits(entry.filename().string());
-      if (entry_name == "images" && fs::is_directory(entry)) set.images = entry.string();
+      if (entry_name == "images" && fs::is_directory(entry, error)) set.images = entry.string();
       const bool is_truth = entry_name.find("truth") != std::string::npos;
       if (is_truth && entry.extension() == ".mat") set.truth.truth = entry.string();
     }
@@ -136,6 +142,7 @@ int run_set(const PublicSet& set, const SessionFlags& flags) {
   set.truth.check();
   session.source = subsample(open_source(set.images), static_cast<std::size_t>(set.every), 0);
   session.input = set.images;
+  session.truth_files = set.truth.files();
   session.every = set.every;
   session.evaluation = set.truth.evaluation();
   // The matrix is in the numbers of the images that are read.

@@ -6,6 +6,7 @@
 #include "loopbit/error.hpp"
 
 #include "commands.hpp"
+#include "ranges.hpp"
 #include "session.hpp"
 
 namespace loopbit::cli {
@@ -35,6 +36,7 @@ int run_command(const RunFlags& flags) {
   session.source = subsample(open_source(flags.input), static_cast<std::size_t>(flags.every),
                              static_cast<std::size_t>(flags.limit));
   session.input = flags.input;
+  session.truth_files = flags.truth.files();
   session.every = flags.every;
   session.limit = flags.limit;
   return run_session(std::move(session), flags.session);
@@ -59,10 +61,10 @@ void add_run(CLI::App& app, int& exit_code) {
   flags->session.add_to(*command);
   command->add_option("--every", flags->every, "Read every N-th frame only")
       ->type_name("N")
-      ->check(CLI::Range(1, 1'000'000));
+      ->check(whole_number(1, 1'000'000));
   command->add_option("--limit", flags->limit, "Read at most N frames; 0 = all")
       ->type_name("N")
-      ->check(CLI::Range(0, 2'000'000'000));
+      ->check(whole_number(0, 2'000'000'000));
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
   command->footer(list_truth_settings());

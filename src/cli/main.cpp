@@ -3,6 +3,8 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <string>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -12,6 +14,7 @@
 #include "loopbit/version.hpp"
 
 #include "commands.hpp"
+#include "streams.hpp"
 
 namespace {
 
@@ -35,14 +38,21 @@ int exit_code_of(ErrorKind kind) {
   return cli::internal_error;
 }
 
-/// CLI11 says of an unknown command only that one is required.
-void check_command(const CLI::App& app, int argc, char** argv) {
-  if (argc < 2 || argv[1][0] == '-') return;
-  const auto is_named = [&](const CLI::App* command) { return command->check_name(argv[1]); };
-  if (!app.get_subcommands(is_named).empty()) return;
-  throw loopbit::Error(
-      ErrorKind::option,
-      fmt::format("There is no command '{}'; see 'loopbit --help' for those there are.", argv[1]));
+/// CLI11 says of an unknown word in a command's place only that a command is required. `name`: of
+/// `app`, whose command or option stands at argv[at].
+void check_command(const CLI::App& app, const std::string& name, int at, int argc, char** argv) {
+  if (at >= argc) return;
+  const std::string word = argv[at];
+  const bool is_option = word.starts_with('-');
+  if (is_option && app.get_option_no_throw(word)) return;
+  for (const CLI::App* command :
+       app.get_subcommands([&](const CLI::App* one) { return one->check_name(word); })) {
+    if (command->get_require_subcommand_min() == 0) return;
+    return check_command(*command, name + ' ' + word, at + 1, argc, argv);
+  }
+  throw loopbit::Error(ErrorKind::option,
+                       fmt::format("There is no {} '{}'; see '{} --help' for those there are.",
+                                   is_option ? "option" : "command", word, name));
 }
 
 int run_command_line(int argc, char** argv) {
@@ -60,12 +70,24 @@ int run_command_line(int argc, char** argv) {
   cli::add_report(app);
   cli::add_reproduce(app, exit_code);
   cli::add_options(app);
-  check_command(app, argc, argv);
+  check_command(app, "loopbit", 1, argc, argv);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? cli::success : cli::bad_option;
   }
+  return exit_code;
+}
+
+/// What is printed counts as done when it is out.
+int run_and_flush(int argc, char** argv) {
+  int exit_code = cli::success;
+  try {
+    exit_code = run_command_line(argc, argv);
+  } catch (const std::system_error&) {  // from fmt::print
+    if (std::ferror(stdout) == 0) throw;
+  }
+  cli::flush_stdout();
   return exit_code;
 }
 
@@ -76,13 +98,14 @@ int main(int argc, char** argv) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   // Past a file size limit, let write() fail, which is reported as any full disk is.
   std::signal(SIGXFSZ, SIG_IGN);
+  cli::keep_closed_streams_closed();
   try {
-    return run_command_line(argc, argv);
+    return run_and_flush(argc, argv);
   } catch (const loopbit::Error& error) {
-    fmt::print(stderr, "loopbit: {}\n", error.what());
+    cli::tell(fmt::format("loopbit: {}\n", error.what()));
     return exit_code_of(error.kind());
   } catch (const std::exception& error) {
-    fmt::print(stderr, "loopbit: internal error, please report it: {}\n", error.what());
+    cli::tell(fmt::format("loopbit: internal error, please report it: {}\n", error.what()));
     return cli::internal_error;
   }
 }

@@ -4,10 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <fmt/format.h>
 #include <unistd.h>
+
+#include "streams.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -33,8 +34,8 @@ Progress::Progress(std::optional<std::size_t> total)
 Progress::~Progress() {
   clear_line();
   if (reports_ > kMaxReports) {
-    fmt::print(stderr, "loopbit: {} frames were unreadable in all; loops.csv lists them.\n",
-               reports_);
+    tell(fmt::format("loopbit: {} frames were unreadable in all; loops.csv lists them.\n",
+                     reports_));
   }
 }
 
@@ -45,14 +46,13 @@ void Progress::advance(bool is_loop) {
   if (now - last_shown_ < (on_terminal_ ? kTerminalPause : kPlainPause)) return;
   last_shown_ = now;
   clear_line();
-  fmt::print(stderr, "{}{}", line(), on_terminal_ ? "" : "\n");
-  std::fflush(stderr);
+  tell(line() + (on_terminal_ ? "" : "\n"));
 }
 
 void Progress::report(const std::string& sentence) {
   if (++reports_ > kMaxReports) return;
   clear_line();
-  fmt::print(stderr, "loopbit: {}\n", sentence);
+  tell(fmt::format("loopbit: {}\n", sentence));
 }
 
 std::string Progress::line() const {
@@ -75,7 +75,7 @@ std::string Progress::bar() const {
 }
 
 void Progress::clear_line() const {
-  if (on_terminal_) fmt::print(stderr, "\r\033[K");
+  if (on_terminal_) tell("\r\033[K");
 }
 
 }  // namespace loopbit::cli

@@ -3,6 +3,7 @@
 #include "run_list.hpp"
 
 #include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -15,14 +16,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
+bool is_folder(const std::string& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
 std::pair<std::string, std::string> name_and_path(const std::string& text) {
   const auto equals = text.find('=');
-  if (equals != std::string::npos && !fs::exists(text)) {
+  std::error_code error;
+  if (equals != std::string::npos && !fs::exists(text, error)) {
     return {text.substr(0, equals), text.substr(equals + 1)};
   }
   const fs::path path = fs::path(text).lexically_normal();
   const fs::path last = path.has_filename() ? path : path.parent_path();
-  return {fs::is_directory(text) ? last.filename().string() : last.stem().string(), text};
+  return {is_folder(text) ? last.filename().string() : last.stem().string(), text};
 }
 
 /// How the run in a folder was scored when it ended.
@@ -42,7 +49,7 @@ ReportRun report_run(const std::string& text, const TruthFlags& flags) {
   ReportRun run;
   run.name = name;
   int every = 1;
-  if (fs::is_directory(path)) {
+  if (is_folder(path)) {
     run.run = read_run(path);
     run.list = match_list(run.run->detections);
     run.truth = run.run->truth;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <deque>
 #include <thread>
 #include <utility>
 
@@ -15,7 +16,9 @@
 #include "loopbit/recorded_run.hpp"
 
 #include "commands.hpp"
+#include "map_damage.hpp"
 #include "progress.hpp"
+#include "ranges.hpp"
 #include "run_list.hpp"
 #include "stop_signal.hpp"
 #include "summary.hpp"
@@ -39,6 +42,42 @@ void check_readable(const std::vector<Detection>& detections, const std::string&
                             detections.size(), input));
   }
 }
+
+/// A source that is known to have a frame that can be read.
+class ProvenSource final : public ImageSource {
+ public:
+  /// Throws Error (kind input) if there is none.
+  ProvenSource(std::unique_ptr<ImageSource> source, const std::string& input)
+      : source_(std::move(source)) {
+    for (Frame frame; source_->next(frame); frame = {}) {
+      first_.push_back(frame);
+      if (frame.error.empty()) return;
+    }
+    throw Error(ErrorKind::input,
+                fmt::format("None of the {} frames of '{}' could be read, so no earlier run is "
+                            "replaced. {}",
+                            first_.size(), input, first_.empty() ? "" : first_.front().error));
+  }
+
+  bool next(Frame& frame) override {
+    if (first_.empty()) return source_->next(frame);
+    frame = std::move(first_.front());
+    first_.pop_front();
+    return true;
+  }
+
+  bool skip() override {
+    Frame frame;
+    return next(frame);
+  }
+
+  [[nodiscard]] std::optional<std::size_t> size() const override { return source_->size(); }
+  [[nodiscard]] std::string description() const override { return source_->description(); }
+
+ private:
+  std::unique_ptr<ImageSource> source_;
+  std::deque<Frame> first_;  ///< read, and not given yet
+};
 
 void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
            const std::atomic<bool>& stop) {
@@ -80,7 +119,7 @@ void SessionFlags::add_to(CLI::App& command) {
       ->allow_extra_args(false);
   command.add_option("--threads", threads, "Threads; 0 = one a core. Changes no result")
       ->type_name("N")
-      ->check(CLI::Range(0, 1024));
+      ->check(whole_number(0, 1024));
   command.add_flag("--no-report", no_report, "Keep no pictures and write no report.html");
   add_report_flag(command, report);
 }
@@ -91,7 +130,7 @@ void add_report_flag(CLI::App& command, ReportOptions& options) {
                   "Pictures in the report take at most so many megabytes")
       ->type_name("MB")
       ->capture_default_str()
-      ->check(CLI::Range(0.0, 2000.0));
+      ->check(number(0.0, 2000.0));
 }
 
 LoopDetectorOptions SessionFlags::detector_options() const {
@@ -107,6 +146,11 @@ LoopDetectorOptions SessionFlags::detector_options() const {
 int run_session(Session session, const SessionFlags& flags) {
   const std::atomic<bool>& stop_requested = stop_on_signal();
   const int threads = thread_count(flags.threads);
+  std::vector<std::string> inputs = session.truth_files;
+  inputs.insert(inputs.end(), {session.input, flags.config});
+  if (flags.overwrite) {
+    session.source = std::make_unique<ProvenSource>(std::move(session.source), session.input);
+  }
   RecordedRun recorded({.input = session.input,
                         .description = session.source->description(),
                         .options = flags.detector_options(),
@@ -114,11 +158,12 @@ int run_session(Session session, const SessionFlags& flags) {
                         .limit = session.limit,
                         .threads = threads,
                         .map_path = flags.map},
-                       {flags.out, flags.overwrite, flags.keep_images});
+                       {flags.out, flags.overwrite, flags.keep_images, inputs});
   cv::setNumThreads(threads);
   if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
   try {
     drive(*session.source, recorded, !flags.no_report, stop_requested);
+    warn_of_damage(flags.map, recorded.map_damage());
     if (!stop_requested) check_readable(recorded.folder().detections(), session.input);
     score(session, recorded);
   } catch (const Error& error) {

@@ -41,7 +41,8 @@ struct SessionFlags {
 /// What is to be run, and what is known about it.
 struct Session {
   std::unique_ptr<ImageSource> source;
-  std::string input;  ///< for run.json and the summary
+  std::string input;                          ///< for run.json and the summary
+  std::vector<std::string> truth_files = {};  ///< see TruthFlags::files
   int every = 1;
   int limit = 0;
   // Asked with the frames' times when the run is over.

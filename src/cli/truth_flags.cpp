@@ -12,6 +12,7 @@
 #include "loopbit/protocol.hpp"
 
 #include "commands.hpp"
+#include "ranges.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -70,7 +71,7 @@ void TruthFlags::add_to(CLI::App& command) {
           .add_option("--tolerance", tolerance_frames,
                       "A match is right so many frames before or after a true place, too")
           ->type_name("N")
-          ->check(CLI::Range(0, 1'000'000));
+          ->check(whole_number(0, 1'000'000));
   fixed_by_protocol_[1] =
       command.add_option("--truth-set", settings, "One setting of truth by poses; may be repeated")
           ->type_name("NAME=VALUE")
@@ -79,7 +80,7 @@ void TruthFlags::add_to(CLI::App& command) {
       command
           .add_option("--truth-views", views, "Rows a frame has in a loop matrix (2: left, right)")
           ->type_name("N")
-          ->check(CLI::Range(1, 64));
+          ->check(whole_number(1, 64));
   for (CLI::Option* option :
        {fixed_by_protocol_[0], fixed_by_protocol_[1], fixed_by_protocol_[2]}) {
     option->needs(option_truth);
@@ -130,19 +131,33 @@ void TruthFlags::check() const {
   (void)truth_options();
   // A trajectory can be read only with the times of the frames.
   if (const std::string file = poses_file(); !file.empty()) (void)read_poses(file);
-  if (given() && truth_kind(truth) != TruthKind::poses) (void)read_truth({}, 1);
+  if (!given()) return;
+  const TruthKind kind = truth_kind(truth);
+  check_protocol(kind);
+  (void)read_others(1);
+  if (kind != TruthKind::poses) (void)read_truth({}, 1);
+}
+
+void TruthFlags::check_protocol(TruthKind kind) const {
+  if (protocol.empty() || find_protocol(protocol).truth_kind == kind) return;
+  throw Error(
+      ErrorKind::option,
+      fmt::format("--protocol {} is defined on {}, but '{}' is {}; name another file, or "
+                  "leave out the protocol.",
+                  protocol, name_of(find_protocol(protocol).truth_kind), truth, name_of(kind)));
+}
+
+GroundTruth TruthFlags::read_others(int every) const {
+  GroundTruth others;
+  if (!not_false.empty()) others.near_place = read_place_runs(not_false);
+  if (!ignore.empty()) others.ignored = read_frame_list(ignore);
+  return every_nth(others, every);
 }
 
 std::optional<GroundTruth> TruthFlags::read_truth(const FrameTimes& times_s, int every) const {
   if (!given()) return std::nullopt;
   const TruthKind kind = truth_kind(truth);
-  if (!protocol.empty() && find_protocol(protocol).truth_kind != kind) {
-    throw Error(
-        ErrorKind::option,
-        fmt::format("--protocol {} is defined on {}, but '{}' is {}; name another file, or "
-                    "leave out the protocol.",
-                    protocol, name_of(find_protocol(protocol).truth_kind), truth, name_of(kind)));
-  }
+  check_protocol(kind);
   // A trajectory goes by the frames' times, all else by their numbers in the whole sequence.
   const bool goes_by_time = kind == TruthKind::poses && has_times(read_poses(truth));
   GroundTruth result;
@@ -151,10 +166,7 @@ std::optional<GroundTruth> TruthFlags::read_truth(const FrameTimes& times_s, int
   } else {
     result = every_nth(loopbit::read_truth(truth, truth_options()), every);
   }
-  GroundTruth others;
-  if (!not_false.empty()) others.near_place = read_place_runs(not_false);
-  if (!ignore.empty()) others.ignored = read_frame_list(ignore);
-  others = every_nth(others, every);
+  const GroundTruth others = read_others(every);
   result.near_place.insert(result.near_place.end(), others.near_place.begin(),
                            others.near_place.end());
   result.ignored.insert(result.ignored.end(), others.ignored.begin(), others.ignored.end());

@@ -37,6 +37,9 @@ struct TruthFlags {
 
   [[nodiscard]] bool given() const { return !truth.empty(); }
 
+  /// All files the flags name; some may be empty.
+  [[nodiscard]] std::vector<std::string> files() const { return {truth, not_false, ignore, poses}; }
+
   /// What the protocol says, else what the flags say. Throws Error (kind option) where both speak.
   [[nodiscard]] EvaluationOptions evaluation() const;
 
@@ -55,6 +58,10 @@ struct TruthFlags {
  private:
   [[nodiscard]] TruthOptions truth_options() const;
   [[nodiscard]] std::string poses_file() const;
+  /// What --not-false and --ignore say, of every `every`-th frame.
+  [[nodiscard]] GroundTruth read_others(int every) const;
+  /// Throws Error (kind option) if the protocol is not defined on `kind`.
+  void check_protocol(TruthKind kind) const;
 
   CLI::Option* fixed_by_protocol_[3] = {};
 };

@@ -18,7 +18,8 @@ namespace loopbit {
 namespace fs = std::filesystem;
 
 FolderWatch::FolderWatch(const std::string& folder) : folder_(folder) {
-  if (!fs::is_directory(folder)) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
     throw Error(ErrorKind::input,
                 fmt::format("'{}' is no folder; name one that images come to.", folder));
   }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <utility>
@@ -36,7 +37,7 @@ class Scorer {
     for (const PlaceRun& run : truth.same_place) {
       if (!is_scored(run.query)) continue;
       positives_.insert(run.query);
-      result_.pairs.positives += run.last - run.first + 1;
+      result_.pairs.positives += std::int64_t{run.last} - run.first + 1;
     }
     result_.decision.positives = static_cast<int>(positives_.size());
     result_.decision.ignored = count_ignored(truth);
@@ -151,7 +152,7 @@ Judge::Judge(const GroundTruth& truth, const EvaluationOptions& options)
   for (const PlaceRun& run : truth.near_place) near_place_[run.query].push_back(run);
 }
 
-bool Judge::lists(const RunsByQuery& runs, int query, int match, int tolerance) {
+bool Judge::lists(const RunsByQuery& runs, int query, int match, std::int64_t tolerance) {
   const auto found = runs.find(query);
   return found != runs.end() &&
          std::any_of(found->second.begin(), found->second.end(), [&](const PlaceRun& run) {

@@ -179,7 +179,7 @@ std::vector<Detection> read_detections(const std::string& path) {
 
 FinishedRun read_run(const std::string& path) {
   const fs::path folder = path;
-  if (!fs::exists(folder / kLoopsFile)) {
+  if (!is_there(folder / kLoopsFile)) {
     throw Error(ErrorKind::input,
                 fmt::format("'{}' holds no run: there is no {} in it; name a folder that 'loopbit "
                             "run' or 'loopbit demo' wrote.",
@@ -188,16 +188,16 @@ FinishedRun read_run(const std::string& path) {
   FinishedRun run;
   run.path = path;
   run.detections = read_detections((folder / kLoopsFile).string());
-  if (fs::exists(folder / kRecordFile)) run.record_json = read_text(folder / kRecordFile);
-  if (fs::exists(folder / kTruthFile)) {
+  if (is_there(folder / kRecordFile)) run.record_json = read_text(folder / kRecordFile);
+  if (is_there(folder / kTruthFile)) {
     run.truth = GroundTruth{read_place_runs((folder / kTruthFile).string()),
                             read_place_runs((folder / kNotFalseFile).string()),
                             read_frame_list((folder / kIgnoreFile).string())};
   }
-  if (fs::exists(folder / kPositionsFile)) {
+  if (is_there(folder / kPositionsFile)) {
     run.positions_m = read_positions((folder / kPositionsFile).string(), run.detections.size());
   }
-  if (fs::exists(folder / kEvidenceFile)) run.evidence_path = (folder / kEvidenceFile).string();
+  if (is_there(folder / kEvidenceFile)) run.evidence_path = (folder / kEvidenceFile).string();
   return run;
 }
 

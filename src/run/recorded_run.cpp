@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/recorded_run.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <utility>
@@ -12,6 +13,8 @@
 #include "loopbit/evidence_file.hpp"
 #include "loopbit/finished_run.hpp"
 #include "loopbit/picture_jpeg.hpp"
+
+#include "run_files.hpp"
 
 namespace loopbit {
 namespace {
@@ -51,13 +54,37 @@ std::string folder_of(const RunRecord& record, const std::string& out) {
   return fmt::format("{}_session_{}", stem, record.map_session);
 }
 
+/// Whether a run ended in `folder` before any frame was answered.
+bool is_unanswered(const std::string& folder) {
+  const auto loops = std::filesystem::path(folder) / kLoopsFile;
+  if (!is_there(loops)) return false;
+  try {
+    const auto detections = read_detections(loops.string());
+    return std::all_of(detections.begin(), detections.end(),
+                       [](const Detection& d) { return d.status == Status::unreadable; });
+  } catch (const Error&) {  // no run of ours
+    return false;
+  }
+}
+
+/// The folder of a session is beside the map. One that is there already is of a session the map
+/// does not have.
+bool may_replace(const std::string& folder, const RunOutput& out) {
+  return out.overwrite || (out.folder.empty() && is_unanswered(folder));
+}
+
+RunFolder make_folder(const RunRecord& record, const RunOutput& out) {
+  const std::string folder = folder_of(record, out.folder);
+  return {folder, may_replace(folder, out), out.inputs};
+}
+
 }  // namespace
 
 RecordedRun::RecordedRun(RunRecord record, const RunOutput& out)
     : record_(std::move(record)),
       map_(open_map(record_, out.keep_images)),
       detector_(std::in_place, record_.options, map_),
-      folder_(folder_of(record_, out.folder), out.overwrite) {}
+      folder_(make_folder(record_, out)) {}
 
 void RecordedRun::detect(ImageSource& source, const RunListener& listener, bool keep_evidence,
                          const std::atomic<bool>& stop) {
@@ -80,6 +107,7 @@ void RecordedRun::detect(ImageSource& source, const RunListener& listener, bool 
     };
   }
   run(source, detector, recording, stop);
+  if (map) map_damage_ = map->damage();
   if (evidence) evidence->finish();
   if (map) map->finish();
 }

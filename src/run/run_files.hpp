@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <filesystem>
+#include <system_error>
+
 namespace loopbit {
 
 // The files of a run folder.
@@ -13,5 +16,10 @@ inline constexpr const char* kNotFalseFile = "not_false.csv";
 inline constexpr const char* kIgnoreFile = "ignore.csv";
 inline constexpr const char* kPositionsFile = "positions.csv";
 inline constexpr const char* kReportFile = "report.html";
+
+inline bool is_there(const std::filesystem::path& file) {
+  std::error_code error;
+  return std::filesystem::exists(file, error);
+}
 
 }  // namespace loopbit

@@ -30,29 +30,57 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 /// All that a run may leave; a run that replaces another may not leave its files beside its own.
+/// Last those that tell a run from a data set, so that a run half removed is still one.
 std::vector<std::string> files_of_a_run() {
-  std::vector<std::string> names{kLoopsFile,  kRecordFile,    kTruthFile, kNotFalseFile,
-                                 kIgnoreFile, kPositionsFile, kReportFile};
+  std::vector<std::string> names{kTruthFile, kNotFalseFile, kIgnoreFile, kPositionsFile,
+                                 kReportFile};
   for (const char* suffix : kDatabaseSuffixes) {
     names.push_back(std::string(kEvidenceFile) + suffix);
   }
+  names.insert(names.end(), {kRecordFile, kLoopsFile});
   return names;
 }
 
-void make_folder(const fs::path& folder, bool overwrite) {
+/// Of the files of a run those that are in `folder`. Throws Error if one may not be replaced.
+std::vector<fs::path> files_to_replace(const fs::path& folder, bool overwrite,
+                                       const std::vector<std::string>& inputs) {
+  std::vector<fs::path> files;
+  for (const std::string& name : files_of_a_run()) {
+    if (is_there(folder / name)) files.push_back(folder / name);
+  }
+  if (files.empty()) return files;
+  const fs::path last = files.back().filename();
+  if (last != kRecordFile && last != kLoopsFile) {
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' holds no earlier run, but a file {} that a run might replace; "
+                            "name another folder.",
+                            folder.string(), last.string()));
+  }
+  if (!overwrite) {
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' holds an earlier run ({}); name another folder, or add "
+                            "--overwrite to replace it.",
+                            folder.string(), last.string()));
+  }
+  for (const fs::path& file : files) {
+    for (const std::string& input : inputs) {
+      std::error_code error;
+      if (!fs::equivalent(file, input, error)) continue;
+      throw Error(ErrorKind::output,
+                  fmt::format("'{}' is read by this run, which would replace it; name another "
+                              "folder.",
+                              input));
+    }
+  }
+  return files;
+}
+
+void make_folder(const fs::path& folder, bool overwrite, const std::vector<std::string>& inputs) {
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw cannot_write(folder.string(), error.value());
-  for (const std::string& name : files_of_a_run()) {
-    if (!fs::exists(folder / name)) continue;
-    if (!overwrite) {
-      throw Error(ErrorKind::output,
-                  fmt::format("'{}' holds an earlier run ({}); name another folder, or add "
-                              "--overwrite to replace it.",
-                              folder.string(), name));
-    }
-    if (!fs::remove(folder / name, error))
-      throw cannot_write((folder / name).string(), error.value());
+  for (const fs::path& file : files_to_replace(folder, overwrite, inputs)) {
+    if (!fs::remove(file, error)) throw cannot_write(file.string(), error.value());
   }
 }
 
@@ -144,8 +172,10 @@ Json to_json(const RunRecord& record, const std::vector<Detection>& detections) 
 
 }  // namespace
 
-RunFolder::RunFolder(const std::string& path, bool overwrite) : path_(path) {
-  make_folder(path, overwrite);
+RunFolder::RunFolder(const std::string& path, bool overwrite,
+                     const std::vector<std::string>& inputs)
+    : path_(path) {
+  make_folder(path, overwrite, inputs);
   const fs::path loops = fs::path(path) / kLoopsFile;
   loops_.reset(std::fopen(loops.c_str(), "wx"));
   if (!loops_) throw cannot_write(loops.string(), errno);
@@ -197,7 +227,10 @@ std::string RunFolder::evidence_path() const { return (fs::path(path_) / kEviden
 std::string RunFolder::report_path() const { return (fs::path(path_) / kReportFile).string(); }
 
 void RunFolder::finish(const RunRecord& record) {
-  write_file((fs::path(path_) / kRecordFile).string(), to_json(record, detections_).dump(2) + '\n');
+  // A path need not be UTF-8, which JSON is.
+  const std::string text =
+      to_json(record, detections_).dump(2, ' ', false, Json::error_handler_t::replace);
+  write_file((fs::path(path_) / kRecordFile).string(), text + '\n');
 }
 
 double total_ms(const StepTimes& times) {

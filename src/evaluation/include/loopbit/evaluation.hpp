@@ -39,7 +39,8 @@ class Judge {
  private:
   using RunsByQuery = std::unordered_map<int, std::vector<PlaceRun>>;
 
-  [[nodiscard]] static bool lists(const RunsByQuery& runs, int query, int match, int tolerance);
+  [[nodiscard]] static bool lists(const RunsByQuery& runs, int query, int match,
+                                  std::int64_t tolerance);
 
   int tolerance_frames_;
   RunsByQuery same_place_;

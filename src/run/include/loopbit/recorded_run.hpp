@@ -24,7 +24,8 @@ namespace loopbit {
 struct RunOutput {
   std::string folder;      ///< empty = beside the map, "town_session_2" for session 2 of "town.db"
   bool overwrite = false;  ///< an earlier run in the folder
-  bool keep_images = false;  ///< a small picture of each place in the map
+  bool keep_images = false;              ///< a small picture of each place in the map
+  std::vector<std::string> inputs = {};  ///< files that are read, and never replaced
 };
 
 /// A run of a new detector that leaves its evidence in a folder and, where one is named, its places
@@ -51,12 +52,16 @@ class RecordedRun {
   /// Writes run.json. `stopped_by`: see RunRecord. Throws Error (kind output).
   void finish(const std::string& stopped_by);
 
+  /// What detect() found damaged in the map and left out, a clause a thing.
+  [[nodiscard]] const std::vector<std::string>& map_damage() const { return map_damage_; }
+
   [[nodiscard]] const RunRecord& record() const { return record_; }
   [[nodiscard]] const RunFolder& folder() const { return folder_; }
 
  private:
   RunRecord record_;
   std::shared_ptr<MapWriter> map_;  ///< null without one, and after detect()
+  std::vector<std::string> map_damage_;
   std::optional<LoopDetector> detector_;
   RunFolder folder_;
 };

@@ -39,8 +39,9 @@ struct RunRecord {
 class RunFolder {
  public:
   /// Makes the folder and begins loops.csv. Throws Error (kind output) if the folder holds an
-  /// earlier run and `overwrite` is not set, or if it cannot be written.
-  RunFolder(const std::string& path, bool overwrite);
+  /// earlier run and `overwrite` is not set, if one of its files is among `inputs` or of no run (a
+  /// data set has a truth.csv, too), or if it cannot be written.
+  RunFolder(const std::string& path, bool overwrite, const std::vector<std::string>& inputs = {});
 
   /// Appends a row and hands it to the system, so that it survives this process. Throws Error (kind
   /// output) if the disk is full; rows written before are kept.
