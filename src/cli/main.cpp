@@ -48,7 +48,7 @@ void check_command(const CLI::App& app, const std::string& name, int at, int arg
   for (const CLI::App* command :
        app.get_subcommands([&](const CLI::App* one) { return one->check_name(word); })) {
     if (command->get_require_subcommand_min() == 0) return;
-    return check_command(*command, name + ' ' + word, at + 1, argc, argv);
+    return check_command(*command, fmt::format("{} {}", name, word), at + 1, argc, argv);
   }
   throw loopbit::Error(ErrorKind::option,
                        fmt::format("There is no {} '{}'; see '{} --help' for those there are.",

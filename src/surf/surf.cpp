@@ -94,24 +94,23 @@ class SurfExtractor::Impl {
     if (options_.upright) return working;
     constexpr int kReach = 3;
     constexpr unsigned kWeights = 27 * 27;
-    const auto weighted = [](const auto& at) -> unsigned {
-      return 7 * at(0) + 6 * (at(-1) + at(1)) + 3 * (at(-2) + at(2)) + at(-3) + at(3);
-    };
+    const auto weighted = [](unsigned a, unsigned b, unsigned c, unsigned d, unsigned e, unsigned f,
+                             unsigned g) { return a + 3 * b + 6 * c + 7 * d + 6 * e + 3 * f + g; };
     const int width = working.cols;
     smoothed_.create(working.size());
-    down_sums_.resize(static_cast<std::size_t>(width + 2 * kReach));
+    down_sums_.resize(static_cast<std::size_t>(width) + 2 * std::size_t{kReach});
     unsigned* sums = down_sums_.data() + kReach;
     for (int y = 0; y < working.rows; ++y) {
       const auto row = [&](int k) { return working[std::clamp(y + k, 0, working.rows - 1)]; };
-      const std::array rows{row(-3), row(-2), row(-1), row(0), row(1), row(2), row(3)};
+      const std::array r{row(-3), row(-2), row(-1), row(0), row(1), row(2), row(3)};
       for (int x = 0; x < width; ++x) {
-        sums[x] = weighted(
-            [&](int k) -> unsigned { return rows[static_cast<std::size_t>(kReach + k)][x]; });
+        sums[x] = weighted(r[0][x], r[1][x], r[2][x], r[3][x], r[4][x], r[5][x], r[6][x]);
       }
       std::fill_n(sums - kReach, kReach, sums[0]);
       std::fill_n(sums + width, kReach, sums[width - 1]);
       for (int x = 0; x < width; ++x) {
-        const unsigned sum = weighted([&](int k) { return sums[x + k]; });
+        const unsigned* s = sums + x;
+        const unsigned sum = weighted(s[-3], s[-2], s[-1], s[0], s[1], s[2], s[3]);
         smoothed_(y, x) = static_cast<std::uint8_t>((sum + kWeights / 2) / kWeights);
       }
     }
