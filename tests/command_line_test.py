@@ -154,13 +154,17 @@ class CommandLineTest(CommandTest):
         self.assertEqual(sum(r["status"] == "unreadable" for r in rows(self.out)), 1)
         self.assertIn("has 100 x 80 pixels, but the run began with 320 x 240", ran.stderr)
 
-    def test_many_bad_frames_do_not_flood_the_terminal(self):
+    def unreadable_images(self, number):
+        """A folder of so many empty files, and an image after them."""
         folder = self.scratch / "bad"
         folder.mkdir()
-        for number in range(100):
-            (folder / f"{number}.png").write_bytes(b"")
-        shutil.copy(self.images / "000000.png", folder / "100.png")
-        ran = loopbit("run", folder, "--out", self.out)
+        for image in range(number):
+            (folder / f"{image}.png").write_bytes(b"")
+        shutil.copy(self.images / "000000.png", folder / f"{number}.png")
+        return folder
+
+    def test_many_bad_frames_do_not_flood_the_terminal(self):
+        ran = loopbit("run", self.unreadable_images(100), "--out", self.out)
         self.assertEqual(ran.returncode, 0, ran.stderr)
         self.assertLess(len(ran.stderr.splitlines()), 15)
         self.assertIn("100 frames were unreadable", ran.stderr)
@@ -255,12 +259,7 @@ class CommandLineTest(CommandTest):
                          ["unreadable", "no_earlier_place"])
 
     def test_a_stderr_that_cannot_be_written_ends_nothing(self):
-        bad = self.scratch / "bad"
-        bad.mkdir()
-        for number in range(20):
-            (bad / f"{number}.png").write_bytes(b"")
-        shutil.copy(self.images / "000000.png", bad / "20.png")
-        run = [LOOPBIT, "run", bad, "--no-report", "--out"]
+        run = [LOOPBIT, "run", self.unreadable_images(20), "--no-report", "--out"]
         missing = [LOOPBIT, "run", self.scratch / "none", "--out", self.out]
         with open("/dev/full", "w") as full:
             for name, options in {"full": {"stderr": full},

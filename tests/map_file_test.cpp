@@ -116,6 +116,17 @@ TEST_F(MapFile, SavedFramesAreSeenByReadersBesideTheWriter) {
   EXPECT_EQ(places_of(reader).size(), 100U);
 }
 
+TEST_F(MapFile, DescriptorsThatNoKernelTakesAreLost) {
+  Features features = few_features(0);
+  features.descriptors[1][5] = -128;
+  MapWriter writer(map_path_, fast_options(), "drive");
+  writer.add({.frame = 0}, content_of(0), std::make_shared<const Features>(features), cv::Mat());
+  writer.finish();
+  MapReader map(map_path_);
+  EXPECT_FALSE(map.features_of(places_of(map).front()));
+  EXPECT_FALSE(map.damage().empty());
+}
+
 TEST_F(MapFile, AWriterGivesTheFeaturesOfPlacesSavedAndPending) {
   add_session(map_path_, 3);
   MapWriter map(map_path_, fast_options(), "drive");

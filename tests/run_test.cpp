@@ -357,6 +357,20 @@ TEST(Run, FramesWithoutTimesEndItWhereASettingIsInSeconds) {
   });
 }
 
+TEST(Run, ALaterFrameWithoutATimeIsLeftOut) {
+  auto list = frames(3);
+  list[1].timestamp_s.reset();
+  FrameSource source(list);
+  LoopDetectorOptions options;
+  options.exclusion.seconds = 5;
+  LoopDetector detector(options);
+  std::vector<Status> seen;
+  run(source, detector,
+      {[&](const Detection& d) { seen.push_back(d.status); }, [](const std::string&) {}}, false);
+  EXPECT_EQ(seen,
+            (std::vector{Status::no_earlier_place, Status::unreadable, Status::no_earlier_place}));
+}
+
 TEST(Run, TheSizeIsThatOfTheFirstUsableFrame) {
   auto list = frames(3);
   list[0] = {"tiny.png", 0.0, cv::Mat1b(8, 8, std::uint8_t{0}), {}};

@@ -132,10 +132,12 @@ void TruthFlags::check() const {
   // A trajectory can be read only with the times of the frames.
   if (const std::string file = poses_file(); !file.empty()) (void)read_poses(file);
   if (!given()) return;
-  const TruthKind kind = truth_kind(truth);
-  check_protocol(kind);
-  (void)read_others(1);
-  if (kind != TruthKind::poses) (void)read_truth({}, 1);
+  if (const TruthKind kind = truth_kind(truth); kind == TruthKind::poses) {
+    check_protocol(kind);
+    (void)read_others(1);
+  } else {
+    (void)read_truth({}, 1);
+  }
 }
 
 void TruthFlags::check_protocol(TruthKind kind) const {

@@ -18,7 +18,8 @@ std::string fault(const Frame& frame, const std::optional<cv::Size>& size) {
       frame.name, frame.image.cols, frame.image.rows, size->width, size->height);
 }
 
-/// Where the settings need times that the source does not have, no frame is any better.
+/// Of the first usable frame: where the settings need times that it does not have, no other is any
+/// better.
 void check_time(const Frame& frame, const LoopDetector& detector) {
   const double seconds = detector.options().exclusion.seconds;
   if (seconds <= 0 || frame.timestamp_s) return;
@@ -41,7 +42,7 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
     if (const std::string reason = fault(frame, size); !reason.empty()) {
       return leave_out(frame, reason);
     }
-    check_time(frame, detector);
+    if (!size) check_time(frame, detector);
     Evidence evidence;
     Detection detection;
     try {

@@ -25,7 +25,7 @@ struct RunListener {
 /// Reads `source` to its end, or until `stop` turns true, and detects frame by frame. A frame that
 /// is unreadable, or whose size differs from the first one's, is reported and counted with the
 /// status unreadable, and the run goes on. Errors from the listener end the run. Throws Error (kind
-/// option) if exclusion.seconds is set and a frame has no time.
+/// option) if exclusion.seconds is set and the first usable frame has no time.
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
          const std::atomic<bool>& stop);
 
