@@ -106,6 +106,7 @@ class MemoryMap : public loopbit::MapStorage {
     ++session_;
   }
 
+  void check_options(const loopbit::LoopDetectorOptions& /*options*/) override {}
   void for_each_earlier_place(const Visit& visit) override {
     for (std::size_t i = 0; i < earlier_; ++i) visit(origins_[i], contents_[i]);
   }

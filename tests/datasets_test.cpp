@@ -330,6 +330,15 @@ TEST_F(Datasets, ListIsRelativeToItsFile) {
   expect_all_readable(frames);
 }
 
+TEST_F(Datasets, ListFindsTheFolderOfItsImagesThoughSomeAreMissing) {
+  write_images({"images/b.png", "images/c.png"});
+  write("list.txt", "a.png\nb.png\nc.png\n");
+  const std::vector<Frame> frames = read_all(*open_source(path("list.txt")));
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_NE(frames[0].error, "");
+  expect_all_readable({frames[1], frames[2]});
+}
+
 TEST_F(Datasets, ListNamesTheMalformedRow) {
   write("list.csv", "# name\na.png\n17,a.png\n");
   expect_open_error(path("list.csv"), ErrorKind::input,

@@ -86,6 +86,25 @@ TEST(Evaluate, ToleranceIsCountedInFramesFromTheNearestTruePlace) {
   }
 }
 
+TEST(Evaluate, APairCountsOnceHoweverOftenTruthListsIt) {
+  const GroundTruth truth{{{10, 4, 6}, {10, 0, 5}, {10, 2, 3}, {11, 5, 5}, {10, 0, 5}}, {}, {}};
+  const MatchList list{{loop(10, 0), loop(10, 5), loop(11, 5)}, {}};
+  const PairCounts pairs = evaluate(list, truth).pairs;
+  EXPECT_EQ(pairs.positives, 8);
+  EXPECT_EQ(pairs.found, 3);
+  EXPECT_DOUBLE_EQ(pairs.recall(), 3.0 / 8.0);
+}
+
+TEST(Evaluate, ToleratedPairsArePreciseButRecallNoTruePair) {
+  const GroundTruth truth{{{10, 4, 4}}, {}, {}};
+  const PairCounts pairs =
+      evaluate({{loop(10, 3), loop(10, 4), loop(10, 5), loop(10, 7)}, {}}, truth, {2}).pairs;
+  EXPECT_EQ(pairs.right, 3);
+  EXPECT_EQ(pairs.wrong, 1);
+  EXPECT_EQ(pairs.recall(), 1.0);
+  EXPECT_EQ(pairs.precision(), 0.75);
+}
+
 TEST(Evaluate, TheGreatestFrameNumbersDoNotOverflow) {
   constexpr int kLast = std::numeric_limits<int>::max();
   const GroundTruth truth{{{40, 0, kLast}, {41, 1, kLast}}, {}, {}};

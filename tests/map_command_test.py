@@ -152,6 +152,8 @@ class MapCommandTest(CommandTest):
         self.assert_fails(loopbit("query", self.map), 2, "--watch")
         self.assert_fails(loopbit("query", self.map, "x.png", "--set", "surf.upright=false"), 2,
                           "surf.upright", self.map)
+        self.assert_fails(loopbit("query", self.map, "x.png", "--set", "exclusion.seconds=5"), 2,
+                          "exclusion.seconds", "no effect")
 
     def test_watch_answers_images_as_they_come(self):
         folder = self.scratch / "incoming"

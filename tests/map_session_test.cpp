@@ -138,6 +138,23 @@ TEST_F(MapSession, PlacesWithoutTheirFeaturesAreNeverMatched) {
   EXPECT_EQ(map->damage().size(), 1U);
 }
 
+TEST_F(MapSession, ADetectorOfOtherSettingsIsRefused) {
+  drive(0, 3);
+  LoopDetectorOptions options = fast_options();
+  options.decision.min_score = 99;  // shapes no place
+  const auto map = std::make_shared<MapReader>(path("map.db"));
+  const auto writer = std::make_shared<MapWriter>(path("new.db"), fast_options(), "drive");
+  options.surf.max_keypoints = 200;
+  for (const std::shared_ptr<MapStorage>& each : {std::shared_ptr<MapStorage>(map), {writer}}) {
+    expect_error(ErrorKind::option,
+                 {"surf.max_keypoints is 200", ".db", "made with surf.max_keypoints = 300"},
+                 [&] { const LoopDetector detector(options, each); });
+  }
+  options.surf.max_keypoints = 300;
+  EXPECT_EQ(LoopDetector(options, map).query(view(1)).status, Status::low_score);
+  EXPECT_EQ(LoopDetector(options, writer).size(), 0);
+}
+
 TEST_F(MapSession, AMapServesOneDetector) {
   drive(0, kLap - 1);
   const auto reader = std::make_shared<MapReader>(path("map.db"));

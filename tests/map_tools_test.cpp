@@ -68,6 +68,19 @@ TEST_F(MapTools, MapsOfOtherSettingsAreNotMerged) {
   EXPECT_EQ(places_of(path("a.db")).size(), 3U);
 }
 
+TEST_F(MapTools, HalfASessionIsNotMerged) {
+  add_session(path("a.db"), 3);
+  {
+    MapWriter map(path("b.db"), fast_options(), "drive");
+    add_frame(map, 0);
+    map.flush();
+    expect_error(ErrorKind::input, {path("b.db"), "being written"},
+                 [&] { merge_map(path("a.db"), path("b.db")); });
+    add_frame(map, 1);
+  }
+  EXPECT_EQ(merge_map(path("a.db"), path("b.db")).places, 2);
+}
+
 TEST_F(MapTools, OfADamagedMapNothingIsMerged) {
   add_session(path("a.db"), 3);
   add_session(path("b.db"), 3);

@@ -165,6 +165,15 @@ TEST_F(RunFolderTest, AChangedRowIsNamed) {
                      [&] { (void)read_run(path("none")); });
 }
 
+TEST_F(RunFolderTest, TruthThatIsHalfWrittenIsNone) {
+  RunFolder folder(path("run"), false);
+  fs::create_directory(path("run/ignore.csv"));
+  test::expect_error(ErrorKind::output, {path("run/ignore.csv")}, [&] {
+    folder.write_truth({{{1, 0, 0}}, {}, {2}});
+  });
+  EXPECT_FALSE(read_run(path("run")).truth.has_value());
+}
+
 TEST_F(RunFolderTest, AReplacedRunLeavesNothingBeside) {
   {
     RunFolder folder(path("run"), false);
@@ -225,6 +234,16 @@ TEST_F(EvidenceFileTest, WhatWasWrittenIsRead) {
     EXPECT_EQ(content, evidence(frame).content);
   });
   EXPECT_EQ(frames, kFrames);
+}
+
+TEST_F(EvidenceFileTest, WhatWasSeenBeforeAnErrorIsSaved) {
+  {
+    EvidenceWriter writer(path("evidence.db"));
+    for (int frame = 0; frame < 5; ++frame) writer.add(frame, test::view(frame), evidence(frame));
+  }
+  StoredEvidence stored;
+  EXPECT_TRUE(EvidenceReader(path("evidence.db")).read(4, stored));
+  EXPECT_FALSE(fs::exists(path("evidence.db-wal")));
 }
 
 TEST_F(EvidenceFileTest, TakesEveryKindOfImage) {

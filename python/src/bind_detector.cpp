@@ -49,29 +49,11 @@ struct FreeAndLocked {
   std::scoped_lock<std::recursive_mutex> lock;
 };
 
-/// Throws Error unless a section of the settings is what a map was made with.
-template <typename Part>
-void check_same(const char* section, const Part& map, const Part& detector) {
-  for_each_field<Part>([&](const auto& field) {
-    const auto ours = detector.*field.member;
-    const auto theirs = map.*field.member;
-    if (ours == theirs) return;
-    throw Error(ErrorKind::option,
-                fmt::format("{0}.{1} is {2}, but the map was made with {0}.{1} = {3}; give the "
-                            "detector the options of the map, or none.",
-                            section, field.name, ours, theirs));
-  });
-}
-
 LoopDetectorOptions options_for(const std::optional<LoopDetectorOptions>& options,
                                 const SharedMap* map) {
+  if (options) return *options;
   const auto of_map = map ? map->options() : std::nullopt;
-  if (!options) return of_map.value_or(LoopDetectorOptions{});
-  if (of_map) {
-    check_same("binary_content", of_map->binary_content, options->binary_content);
-    check_same("surf", of_map->surf, options->surf);
-  }
-  return *options;
+  return of_map.value_or(LoopDetectorOptions{});
 }
 
 std::string detection_text(const Detection& d) {

@@ -74,8 +74,8 @@ void bind_matches(py::module_& module) {
 }
 
 template <typename Counts>
-void bind_shares(py::class_<Counts>& type) {
-  type.def_property_readonly("recall", &Counts::recall, "right / positives; 0 without positives.")
+void bind_shares(py::class_<Counts>& type, const char* recall) {
+  type.def_property_readonly("recall", &Counts::recall, recall)
       .def_property_readonly("precision", &Counts::precision,
                              "right / (right + wrong); 1 without loops.")
       .def("__repr__", [](const Counts& self) {
@@ -94,12 +94,14 @@ void bind_counts(py::module_& module) {
       .def_readonly("tolerated", &DecisionCounts::tolerated)
       .def_readonly("wrong", &DecisionCounts::wrong)
       .def_readonly("ignored", &DecisionCounts::ignored, "Queries left out of the score.");
-  bind_shares(decision);
+  bind_shares(decision, "right / positives; 0 without positives.");
   py::class_<PairCounts> pairs(module, "PairCounts", "What they come to pair by pair.");
   pairs.def_readonly("positives", &PairCounts::positives, "All true pairs of frames.")
-      .def_readonly("right", &PairCounts::right)
+      .def_readonly("found", &PairCounts::found, "Of those the accepted ones.")
+      .def_readonly("right", &PairCounts::right,
+                    "Accepted ones that are true or within the tolerance of a true one.")
       .def_readonly("wrong", &PairCounts::wrong);
-  bind_shares(pairs);
+  bind_shares(pairs, "found / positives; 0 without positives.");
 }
 
 void bind_result(py::module_& module) {

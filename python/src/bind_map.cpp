@@ -207,6 +207,9 @@ void bind_writer(py::module_& module) {
       .def_property_readonly(
           "saved_frames", py::cpp_function(&call<&MapWriter::saved_frames, SharedWriter>, Free()),
           "Frames of this session that are committed: nothing takes them away again.")
+      .def_property_readonly("damage",
+                             py::cpp_function(&call<&MapWriter::damage, SharedWriter>, Free()),
+                             "As MapReader's: what candidates were found to have lost.")
       .def("flush", &call<&MapWriter::flush, SharedWriter>, Free(),
            "Commits what was added so far.")
       .def(

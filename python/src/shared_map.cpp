@@ -4,6 +4,11 @@
 
 namespace loopbit::python {
 
+void SharedMap::check_options(const LoopDetectorOptions& options) {
+  const auto guard = lock();
+  storage().check_options(options);
+}
+
 void SharedMap::for_each_earlier_place(const Visit& visit) {
   const auto guard = lock();
   storage().for_each_earlier_place(visit);

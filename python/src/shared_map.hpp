@@ -25,6 +25,7 @@ class SharedMap : public MapStorage {
   /// What a detector of the map must be given; nothing if the map does not say.
   [[nodiscard]] virtual std::optional<LoopDetectorOptions> options() const = 0;
 
+  void check_options(const LoopDetectorOptions& options) final;
   void for_each_earlier_place(const Visit& visit) final;
   void for_each_earlier_loop(const VisitLoop& visit) final;
   std::shared_ptr<const Features> features(PlaceId place) final;

@@ -38,7 +38,7 @@ void print_decision(const DecisionCounts& counts) {
 
 void print_pairs(const PairCounts& pairs) {
   fmt::print("pairs      {} of {} true pairs found: recall {:.4f}; {} wrong: precision {:.4f}\n",
-             pairs.right, pairs.positives, pairs.recall(), pairs.wrong, pairs.precision());
+             pairs.found, pairs.positives, pairs.recall(), pairs.wrong, pairs.precision());
 }
 
 void print_sweep(const Evaluation& evaluation) {

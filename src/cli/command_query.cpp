@@ -48,6 +48,12 @@ LoopDetectorOptions detector_options(const MapReader& map, const QueryFlags& fla
                               "map with 'loopbit run --map'.",
                               name, flags.map));
     }
+    if (name.starts_with("exclusion.")) {
+      throw Error(ErrorKind::option,
+                  fmt::format("{} has no effect on a query: all places of '{}' are candidates; "
+                              "leave it out.",
+                              name, flags.map));
+    }
     set_option(options, name, value);
   }
   validate(options);

@@ -2,15 +2,13 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/ground_truth.hpp"
 
-#include <cerrno>
-#include <fstream>
 #include <optional>
 #include <string_view>
 
 #include <fmt/format.h>
-#include <fmt/ostream.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "cells.hpp"
 #include "text_rows.hpp"
@@ -87,11 +85,10 @@ GroundTruth every_nth(const GroundTruth& truth, int every) {
 
 void write_place_runs(const std::string& path, const std::string& comment,
                       const std::vector<PlaceRun>& runs) {
-  std::ofstream file(path);
-  fmt::print(file, "# {}\n", comment);
-  for (const PlaceRun& run : runs) fmt::print(file, "{},{},{}\n", run.query, run.first, run.last);
-  file.close();
-  if (!file) throw cannot_write(path, errno);
+  std::string text = fmt::format("# {}\n", comment);
+  for (const PlaceRun& run : runs)
+    text += fmt::format("{},{},{}\n", run.query, run.first, run.last);
+  write_file(path, text);
 }
 
 }  // namespace loopbit

@@ -167,10 +167,15 @@ ImageList list_file(const fs::path& file) {
     list.images.push_back({row.text, {}});
   }
   if (list.images.empty()) throw_no_rows(file);
-  // Data sets often keep a list beside the folder of the images it names.
-  const fs::path images = list.root / "images";
-  const std::string& first = list.images.front().name;
-  if (!is_file(list.root / first) && is_file(images / first)) list.root = images;
+  // Data sets often keep a list beside the folder of the images it names. Some may be missing.
+  for (const fs::path& root : {list.root, list.root / "images"}) {
+    const bool has_any =
+        std::any_of(list.images.begin(), list.images.end(),
+                    [&](const ListedImage& image) { return is_file(root / image.name); });
+    if (!has_any) continue;
+    list.root = root;
+    break;
+  }
   return list;
 }
 

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 #include <utility>
+#include <vector>
 
 namespace loopbit {
 namespace {
@@ -28,17 +29,36 @@ std::map<int, ReportedMatch> best_by_query(const std::vector<ReportedMatch>& mat
   return best;
 }
 
+/// True pairs of a query and an earlier frame among scored queries. Runs may overlap.
+std::int64_t count_pairs(std::vector<PlaceRun> runs) {
+  std::sort(runs.begin(), runs.end(), [](const PlaceRun& a, const PlaceRun& b) {
+    return std::pair(a.query, a.first) < std::pair(b.query, b.first);
+  });
+  std::int64_t pairs = 0;
+  std::int64_t next = 0;  // the first frame that is not counted yet
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    if (i == 0 || runs[i].query != runs[i - 1].query) next = runs[i].first;
+    next = std::max<std::int64_t>(next, runs[i].first);
+    const std::int64_t end = std::int64_t{runs[i].last} + 1;
+    pairs += std::max<std::int64_t>(0, end - next);
+    next = std::max(next, end);
+  }
+  return pairs;
+}
+
 /// One evaluation in the making.
 class Scorer {
  public:
   Scorer(const MatchList& list, const GroundTruth& truth, const EvaluationOptions& options)
       : list_(list), judge_(truth, options) {
     result_.options = options;
+    std::vector<PlaceRun> scored;
     for (const PlaceRun& run : truth.same_place) {
       if (!is_scored(run.query)) continue;
       positives_.insert(run.query);
-      result_.pairs.positives += std::int64_t{run.last} - run.first + 1;
+      scored.push_back(run);
     }
+    result_.pairs.positives = count_pairs(std::move(scored));
     result_.decision.positives = static_cast<int>(positives_.size());
     result_.decision.ignored = count_ignored(truth);
   }
@@ -102,6 +122,7 @@ class Scorer {
       if (!seen.emplace(match.query, match.match).second) continue;
       const Judgement judgement = judge_.judge(match.query, match.match);
       if (judgement == Judgement::right) ++result_.pairs.right;
+      if (judge_.is_true_pair(match.query, match.match)) ++result_.pairs.found;
       if (judgement == Judgement::wrong) ++result_.pairs.wrong;
     }
   }
@@ -160,6 +181,8 @@ bool Judge::lists(const RunsByQuery& runs, int query, int match, std::int64_t to
          });
 }
 
+bool Judge::is_true_pair(int query, int match) const { return lists(same_place_, query, match, 0); }
+
 Judgement Judge::judge(int query, int match) const {
   if (lists(same_place_, query, match, tolerance_frames_)) return Judgement::right;
   return lists(near_place_, query, match, 0) ? Judgement::tolerated : Judgement::wrong;
@@ -182,7 +205,7 @@ Interval wilson_interval(std::int64_t hits, std::int64_t trials) {
 
 double DecisionCounts::recall() const { return share(right, positives, 0.0); }
 double DecisionCounts::precision() const { return share(right, right + wrong, 1.0); }
-double PairCounts::recall() const { return share(right, positives, 0.0); }
+double PairCounts::recall() const { return share(found, positives, 0.0); }
 double PairCounts::precision() const { return share(right, right + wrong, 1.0); }
 
 Evaluation evaluate(const MatchList& list, const GroundTruth& truth,

@@ -48,6 +48,7 @@ std::string to_json(const Evaluation& evaluation, bool full) {
             {"average_precision", evaluation.average_precision},
             {"pairs",
              {{"positives", pairs.positives},
+              {"found", pairs.found},
               {"right", pairs.right},
               {"wrong", pairs.wrong},
               {"recall", pairs.recall()},

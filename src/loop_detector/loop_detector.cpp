@@ -92,6 +92,7 @@ class LoopDetector::Impl {
                      [this](PlaceId place) { return step_of(place); }},
                     agreement_, known_loops_) {
     validate(options);
+    memory_.check_options(options);
     PlaceId latest_step = 0;
     memory_.restore([&](const BinaryContent& content) {
       const PlaceId place = index_.add(content);

@@ -19,6 +19,11 @@ class PlaceMemory {
   /// `map`: null = all in memory.
   explicit PlaceMemory(std::shared_ptr<MapStorage> map) : map_(std::move(map)) {}
 
+  /// Throws Error (kind option) if the map's places were made with other settings.
+  void check_options(const LoopDetectorOptions& options) const {
+    if (map_) map_->check_options(options);
+  }
+
   /// Calls visit(content) with each place of earlier sessions, in order; it returns whether the
   /// place changed the view.
   template <typename Visit>

@@ -109,6 +109,10 @@ std::vector<std::string> MapReader::check_structure() const {
   return faults;
 }
 
+void MapReader::check_options(const LoopDetectorOptions& options) {
+  if (!sessions().empty()) check_detector(impl_->path, this->options(), options);
+}
+
 void MapReader::for_each_earlier_place(const Visit& visit) {
   impl_->stored.begin(impl_->path);
   for_each_place([&](const MapPlace& place) {
@@ -138,8 +142,10 @@ class MapWriter::Impl {
   Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
        EncodeImage encode_image)
       : lock_(std::in_place, path),
+        path_(path),
+        options_(options),
         keeps_images_(encode_image != nullptr),
-        writer_(begin_session(path, options, name, std::move(encode_image))) {}
+        writer_(begin_session(name, std::move(encode_image))) {}
 
   void finish() {
     if (!lock_) return;
@@ -150,8 +156,12 @@ class MapWriter::Impl {
     lock_.reset();
   }
 
+  void check_options(const LoopDetectorOptions& options) {
+    check_detector(path_, options_, options);
+  }
+
   void for_each_earlier_place(const Visit& visit) {
-    stored().begin(database_->path());
+    stored().begin(path_);
     for_each_place(
         *database_,
         [&](const MapPlace& place) {
@@ -159,13 +169,13 @@ class MapWriter::Impl {
           visit(place.at, place.content);
         },
         damage_);
-    refuse_damaged(database_->path(), damage_.clauses());
+    refuse_damaged(path_, damage_.clauses());
   }
 
   void for_each_earlier_loop(const VisitLoop& visit) {
     (void)stored();  // not after finish()
     for (const MapLoop& loop : read_loops(*database_, damage_)) visit(loop.query, loop.match);
-    refuse_damaged(database_->path(), damage_.clauses());
+    refuse_damaged(path_, damage_.clauses());
   }
 
   std::shared_ptr<const Features> features(PlaceId place) {
@@ -191,14 +201,12 @@ class MapWriter::Impl {
   [[nodiscard]] BatchWriter& writer() const { return *writer_; }
 
  private:
-  std::unique_ptr<BatchWriter> begin_session(const std::string& path,
-                                             const LoopDetectorOptions& options,
-                                             const std::string& name, EncodeImage encode_image) {
-    Database database = open_map_for_writing(path);
-    database_.emplace(open_map_for_reading(path));
+  std::unique_ptr<BatchWriter> begin_session(const std::string& name, EncodeImage encode_image) {
+    Database database = open_map_for_writing(path_);
+    database_.emplace(open_map_for_reading(path_));
     stored_.emplace(*database_);
     for (const MapSession& session : read_sessions(*database_, damage_)) {
-      check_same_shape(path, session.options, options);
+      check_same_shape(path_, session.options, options_);
     }
     session_ = next_session(database);
     first_place_ = next_place(database);
@@ -207,7 +215,7 @@ class MapWriter::Impl {
                        .name = name,
                        .started = now_utc(),
                        .loopbit = kVersion,
-                       .options = to_json(options)};
+                       .options = to_json(options_)};
     return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_,
                                          std::move(encode_image));
   }
@@ -226,6 +234,8 @@ class MapWriter::Impl {
   [[nodiscard]] PlaceId session_begin() { return stored().size() - frames_; }
 
   std::optional<WriterLock> lock_;  ///< gone after finish(): others may write
+  std::string path_;
+  LoopDetectorOptions options_;  ///< of the session
   bool keeps_images_;
   int session_ = 0;
   std::int64_t first_place_ = 0;
@@ -252,6 +262,8 @@ std::int64_t MapWriter::saved_frames() const { return impl_->writer().saved_fram
 void MapWriter::flush() { impl_->writer().flush(); }
 void MapWriter::finish() { impl_->finish(); }
 const std::vector<std::string>& MapWriter::damage() const { return impl_->damage().clauses(); }
+
+void MapWriter::check_options(const LoopDetectorOptions& options) { impl_->check_options(options); }
 
 void MapWriter::for_each_earlier_place(const Visit& visit) { impl_->for_each_earlier_place(visit); }
 void MapWriter::for_each_earlier_loop(const VisitLoop& visit) {

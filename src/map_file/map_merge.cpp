@@ -5,6 +5,9 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
 #include "loopbit/map_tools.hpp"
 
 #include "map_copy.hpp"
@@ -49,10 +52,19 @@ MergePlan plan_of(const std::string& into, const Database& to, const MapReader& 
   return plan;
 }
 
+/// A session that is not whole would be taken for known by the next merge.
+void refuse_unfinished(const std::string& from) {
+  if (!is_being_written(from)) return;
+  throw Error(ErrorKind::input, fmt::format("'{}' is being written: only a part of its session "
+                                            "would be copied; merge it when its run has ended.",
+                                            from));
+}
+
 }  // namespace
 
 MergeCounts merge_map(const std::string& into, const std::string& from) {
   MapReader source(from);
+  refuse_unfinished(from);
   const WriterLock lock(into);
   const Database to = open_map_for_writing(into);
   const MergePlan plan = plan_of(into, to, source);

@@ -18,7 +18,12 @@ constexpr std::array kSections{"binary_content", "surf"};
 
 /// The sections of `json` that shape places.
 Json shape_of(const std::string& path, const std::string& json) {
-  const Json all = Json::parse(json, nullptr, false);
+  // What lies deeper is no setting, and a message that shows it would recurse into it.
+  const auto is_shallow = [](int depth, Json::parse_event_t /*event*/, const Json& /*value*/) {
+    constexpr int kSettings = 2;
+    return depth <= kSettings;
+  };
+  const Json all = Json::parse(json, is_shallow, false);
   Json shape;
   for (const char* section : kSections) {
     if (!all.is_object() || !all.contains(section) || !all[section].is_object()) {
@@ -31,6 +36,20 @@ Json shape_of(const std::string& path, const std::string& json) {
     shape[section] = all[section];
   }
   return shape;
+}
+
+template <typename Part>
+void check_part(const std::string& path, const char* section, const Part& map,
+                const Part& detector) {
+  for_each_field<Part>([&](const auto& field) {
+    const auto theirs = map.*field.member;
+    const auto ours = detector.*field.member;
+    if (ours == theirs) return;
+    throw Error(ErrorKind::option,
+                fmt::format("{0}.{1} is {2}, but '{3}' was made with {0}.{1} = {4}: places could "
+                            "not be compared; give the detector the options of the map.",
+                            section, field.name, ours, path, theirs));
+  });
 }
 
 }  // namespace
@@ -59,6 +78,12 @@ void check_same_shape(const std::string& path, const std::string& json,
                       path, section, name, theirs, value.dump(), section, name, theirs));
     }
   }
+}
+
+void check_detector(const std::string& path, const LoopDetectorOptions& made_with,
+                    const LoopDetectorOptions& detector) {
+  check_part(path, kSections[0], made_with.binary_content, detector.binary_content);
+  check_part(path, kSections[1], made_with.surf, detector.surf);
 }
 
 LoopDetectorOptions options_of_shape(const std::string& path, const std::string& json) {

@@ -16,6 +16,11 @@ namespace loopbit {
 void check_same_shape(const std::string& path, const std::string& json,
                       const LoopDetectorOptions& options);
 
+/// Throws Error (kind option) that names the first such setting in which a `detector` differs from
+/// `made_with`, those of the map at `path`.
+void check_detector(const std::string& path, const LoopDetectorOptions& made_with,
+                    const LoopDetectorOptions& detector);
+
 /// The defaults, with those settings of `json` that shape places. Throws Error (kind input) if it
 /// has none, or such as this version does not know.
 LoopDetectorOptions options_of_shape(const std::string& path, const std::string& json);

@@ -16,6 +16,8 @@
 namespace loopbit {
 namespace {
 
+std::string lock_path(const std::string& map_path) { return resolved_path(map_path) + ".lock"; }
+
 /// False if the file was removed, or replaced, after it was opened.
 bool is_still_at(const std::string& path, int file) {
   struct stat opened {};
@@ -26,7 +28,7 @@ bool is_still_at(const std::string& path, int file) {
 
 }  // namespace
 
-WriterLock::WriterLock(const std::string& map_path) : path_(resolved_path(map_path) + ".lock") {
+WriterLock::WriterLock(const std::string& map_path) : path_(lock_path(map_path)) {
   constexpr mode_t kMode = 0666;  // less what umask takes
   do {
     if (file_ >= 0) close(file_);
@@ -47,6 +49,14 @@ WriterLock::WriterLock(const std::string& map_path) : path_(resolved_path(map_pa
 WriterLock::~WriterLock() {
   unlink(path_.c_str());
   close(file_);
+}
+
+bool is_being_written(const std::string& map_path) {
+  const int file = open(lock_path(map_path).c_str(), O_RDONLY | O_CLOEXEC);
+  if (file < 0) return false;
+  const bool is_locked = flock(file, LOCK_SH | LOCK_NB) != 0 && errno == EWOULDBLOCK;
+  close(file);
+  return is_locked;
 }
 
 }  // namespace loopbit

@@ -25,4 +25,7 @@ class WriterLock {
   int file_ = -1;
 };
 
+/// Whether a process, this one or another, holds the lock of the map.
+bool is_being_written(const std::string& map_path);
+
 }  // namespace loopbit

@@ -110,7 +110,12 @@ class EvidenceWriter::Impl {
 };
 
 EvidenceWriter::EvidenceWriter(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
-EvidenceWriter::~EvidenceWriter() = default;
+EvidenceWriter::~EvidenceWriter() {
+  try {
+    impl_->finish();
+  } catch (...) {  // told by finish(), to those who ask
+  }
+}
 void EvidenceWriter::add(PlaceId frame, const cv::Mat& image, const Evidence& evidence) {
   impl_->add(frame, image, evidence);
 }

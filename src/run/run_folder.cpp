@@ -203,14 +203,15 @@ void RunFolder::add(const Detection& detection) {
 
 void RunFolder::write_truth(const GroundTruth& truth) {
   const fs::path folder = path_;
-  write_place_runs((folder / kTruthFile).string(), "query, first and last true earlier frame",
-                   truth.same_place);
   write_place_runs((folder / kNotFalseFile).string(),
                    "query, first and last earlier frame: a match here is not false",
                    truth.near_place);
   std::string ignored = "# queries that are not scored\n";
   for (const int frame : truth.ignored) ignored += fmt::format("{}\n", frame);
   write_file((folder / kIgnoreFile).string(), ignored);
+  // Last: where it is, the others are.
+  write_place_runs((folder / kTruthFile).string(), "query, first and last true earlier frame",
+                   truth.same_place);
 }
 
 void RunFolder::write_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m) {

@@ -161,6 +161,7 @@ def test_writer(images, tmp_path):
     detector.skip()
     map.flush()
     assert map.saved_frames == 2
+    assert map.damage == []
     with pytest.raises(OSError, match="is being written"):
         loopbit.MapWriter(path, loopbit.LoopDetectorOptions(), "another")
     assert loopbit.MapReader(path).places()["timestamp_s"].tolist() == [2.5]
@@ -198,6 +199,13 @@ detector.process(numpy.zeros((240, 320), numpy.uint8))
     subprocess.run([sys.executable, "-c", script], check=True, stdin=subprocess.DEVNULL)
     assert [s.frames for s in loopbit.MapReader(path).sessions] == [1, 1]
     assert [file.name for file in tmp_path.iterdir()] == ["map.db"]
+
+
+def test_a_detector_of_other_settings_is_refused(made):
+    options = loopbit.LoopDetectorOptions()
+    options.surf.max_keypoints = 500
+    with pytest.raises(loopbit.OptionError, match=r"surf\.max_keypoints is 500, but .* = 600"):
+        loopbit.LoopDetector(options, map=loopbit.MapReader(made[0]))
 
 
 def test_a_map_serves_one_detector(made, images):

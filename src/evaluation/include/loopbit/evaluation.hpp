@@ -32,6 +32,8 @@ class Judge {
   explicit Judge(const GroundTruth& truth, const EvaluationOptions& options = {});
 
   [[nodiscard]] Judgement judge(int query, int match) const;
+  /// Whether truth lists the very frame `match` for `query`, whatever the tolerance.
+  [[nodiscard]] bool is_true_pair(int query, int match) const;
   /// Whether `query` is scored and has a true earlier place: whether it is a revisit.
   [[nodiscard]] bool is_positive(int query) const;
   [[nodiscard]] bool is_ignored(int query) const { return ignored_.contains(query); }
@@ -76,11 +78,14 @@ struct DecisionCounts {
 /// What they come to pair by pair: every accepted match counts, and so does every true pair of
 /// frames, however many a query has.
 struct PairCounts {
-  std::int64_t positives = 0;
-  std::int64_t right = 0;
+  std::int64_t positives = 0;  ///< true pairs
+  std::int64_t found = 0;      ///< of those the accepted ones
+  std::int64_t right = 0;  ///< accepted ones that are true or within the tolerance of a true one
   std::int64_t wrong = 0;
 
+  /// found / positives; 0 without positives.
   [[nodiscard]] double recall() const;
+  /// right / (right + wrong); 1 without loops.
   [[nodiscard]] double precision() const;
 };
 

@@ -33,7 +33,8 @@ class LoopDetector {
 
   /// Continues `map` with a new session: all places of earlier sessions are candidates, whatever
   /// the exclusion window. Features are kept there, and fetched when a candidate is verified.
-  /// Throws as above and what the map throws. Cost: some microseconds a place of the map.
+  /// Throws as above, if the map was made with other settings of binary_content or surf, and what
+  /// the map throws. Cost: some microseconds a place of the map.
   LoopDetector(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map);
   ~LoopDetector();
   LoopDetector(const LoopDetector&) = delete;

@@ -9,6 +9,7 @@
 
 #include "loopbit/binary_content.hpp"
 #include "loopbit/detection.hpp"
+#include "loopbit/loop_detector_options.hpp"
 #include "loopbit/place_index.hpp"
 #include "loopbit/surf.hpp"
 
@@ -28,6 +29,10 @@ class MapStorage {
   MapStorage& operator=(const MapStorage&) = delete;
   MapStorage(MapStorage&&) = delete;
   MapStorage& operator=(MapStorage&&) = delete;
+
+  /// Throws Error (kind option) if places that `options` makes cannot be compared with the map's:
+  /// those of binary_content and surf must be the same.
+  virtual void check_options(const LoopDetectorOptions& options) = 0;
 
   /// Calls back with each place of earlier sessions, in order.
   virtual void for_each_earlier_place(const Visit& visit) = 0;

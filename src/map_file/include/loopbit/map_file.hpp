@@ -110,6 +110,7 @@ class MapReader : public MapStorage {
 
   [[nodiscard]] const std::string& path() const;
 
+  void check_options(const LoopDetectorOptions& options) override;
   // For the queries of one LoopDetector: that of another throws Error (kind option), as add() does.
   void for_each_earlier_place(const Visit& visit) override;
   void for_each_earlier_loop(const VisitLoop& visit) override;
@@ -164,6 +165,7 @@ class MapWriter : public MapStorage {
   /// What features() found damaged so far, as MapReader::damage says it.
   [[nodiscard]] const std::vector<std::string>& damage() const;
 
+  void check_options(const LoopDetectorOptions& options) override;
   /// For one LoopDetector: the first throws Error (kind option) when it is called again.
   /// These two throw Error (kind input) where a session, place or loop is damaged: such a map is
   /// not written to.

@@ -32,7 +32,7 @@ struct MergeCounts {
 /// Adds to the map `into`, made if there is none, the sessions of `from` that it lacks, with their
 /// places and loops; all of them or nothing. Throws Error: kind output if `into` has a writer or
 /// cannot be written; option if the two were made with different settings; input if `from` is
-/// damaged.
+/// damaged or being written.
 MergeCounts merge_map(const std::string& into, const std::string& from);
 
 /// Copies what is whole of a damaged map to a new one, under the same numbers. A session whose

@@ -27,6 +27,7 @@ struct StoredEvidence {
 class EvidenceWriter {
  public:
   explicit EvidenceWriter(const std::string& path);
+  /// Saves as finish() does and swallows its error: a run that ends by an error is looked at, too.
   ~EvidenceWriter();
   EvidenceWriter(const EvidenceWriter&) = delete;
   EvidenceWriter& operator=(const EvidenceWriter&) = delete;
