@@ -321,15 +321,14 @@ class CommandLineTest(CommandTest):
         self.out.mkdir(mode=0o555)
         self.assert_fails(loopbit("run", self.few_images(), "--out", self.out), 4, self.out)
 
-    def run_on_small_disk(self, bytes_left, *flags):
+    def run_on_small_disk(self, images, bytes_left, *flags):
         def limit_file_size():
             resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, bytes_left))
 
-        return loopbit("run", self.few_images(), "--out", self.out, *flags,
-                       preexec_fn=limit_file_size)
+        return loopbit("run", images, "--out", self.out, *flags, preexec_fn=limit_file_size)
 
     def test_full_disk_keeps_whole_rows(self):
-        ran = self.run_on_small_disk(700, "--no-report")
+        ran = self.run_on_small_disk(self.images, 5000, "--no-report")
         self.assert_fails(ran, 4, "loops.csv", "rows before are kept")
         text = (self.out / "loops.csv").read_text()
         self.assertTrue(text.endswith("\n"))
@@ -339,7 +338,7 @@ class CommandLineTest(CommandTest):
         self.assertIn(f"The {len(kept)} rows", ran.stderr)
 
     def test_a_disk_too_full_for_pictures_keeps_the_rows(self):
-        ran = self.run_on_small_disk(100_000)
+        ran = self.run_on_small_disk(self.few_images(), 100_000)
         self.assert_fails(ran, 4, "evidence.db", "free space", "--no-report")
         self.assertGreater(len(rows(self.out)), 0)
         self.assertIn("evidence.db", json.loads((self.out / "run.json").read_text())["stopped_by"])

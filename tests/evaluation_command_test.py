@@ -13,8 +13,9 @@ import unittest
 from loopbit_command import FRAMES, CommandTest, loopbit, rows
 
 
-def write_mat(path, name, size, cells):
-    """A MAT-file of version 5 with one dense matrix of bytes, `cells` of which are 1."""
+def write_mat(path, name, size, cells, with_string=False):
+    """A MAT-file of version 5 with one dense matrix of bytes, `cells` of which are 1, perhaps after
+    a string."""
     def element(kind, data):
         return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
 
@@ -24,7 +25,12 @@ def write_mat(path, name, size, cells):
     matrix = (element(6, struct.pack("<II", 9, 0)) + element(5, struct.pack("<ii", size, size))
               + element(1, name.encode()) + element(2, bytes(dense)))
     header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
-    path.write_bytes(header + element(14, matrix))
+    handle = (element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 6, 1))
+              + element(1, b"") + element(6, struct.pack("<6I", 0xDD000000, 2, 1, 1, 1, 1)))
+    string = (element(6, struct.pack("<II", 17, 0)) + element(1, b"s") + element(1, b"MCOS")
+              + element(1, b"string") + element(14, handle))
+    others = element(14, string) if with_string else b""
+    path.write_bytes(header + others + element(14, matrix))
 
 
 class EvaluationCommandTest(CommandTest):
@@ -74,6 +80,11 @@ class EvaluationCommandTest(CommandTest):
         scored = self.score(self.reference, "--truth", matrix)
         self.assertEqual((scored["positives"], scored["pairs"]["positives"]), (2, 3))
 
+    def test_a_matrix_is_found_beside_objects_of_matlabs(self):
+        matrix = self.scratch / "truth.mat"
+        write_mat(matrix, "truth", 10, [(9, 0)], with_string=True)
+        self.assertEqual(self.score(self.file("other.csv", "9,0\n"), "--truth", matrix)["right"], 1)
+
     def test_a_protocol_fixes_its_settings(self):
         matrix = self.scratch / "truth.mat"
         write_mat(matrix, "truth", 200, [(150, 50)])
@@ -100,26 +111,23 @@ class EvaluationCommandTest(CommandTest):
         ran = loopbit("run", self.images, "--out", self.out, "--every", 2, "--truth",
                       self.dataset / "truth.csv", "--poses", self.dataset / "poses.txt")
         self.assertEqual(ran.returncode, 0, ran.stderr)
-        kept = (self.out / "truth.csv").read_text().splitlines()[1:]
-        queries = {int(line.split(",")[0]) for line in kept}
-        full = (self.dataset / "truth.csv").read_text().splitlines()[1:]
-        self.assertLessEqual(queries, {int(line.split(",")[0]) // 2 for line in full
-                                       if int(line.split(",")[0]) % 2 == 0})
-        self.assertGreater(len(queries), 0)
+        self.assertEqual((self.out / "truth.csv").read_text(),
+                         (self.dataset / "truth.csv").read_text())
         positions = (self.out / "positions.csv").read_text().splitlines()[1:]
         poses = (self.dataset / "poses.txt").read_text().splitlines()
         self.assertEqual(len(positions), (FRAMES + 1) // 2)
         self.assertAlmostEqual(float(positions[3].split(",")[1]), float(poses[6].split()[3]), 3)
         again = self.score(self.out, "--truth", self.dataset / "truth.csv")
-        record = json.loads((self.out / "run.json").read_text())["score"]
-        self.assertEqual(again["positives"], record["positives"])
+        record = json.loads((self.out / "run.json").read_text())
+        self.assertEqual(record["truth_every"], 2)
+        self.assertEqual(again["positives"], record["score"]["positives"])
+        self.assertEqual(self.score(self.out)["positives"], record["score"]["positives"])
+        full = (self.dataset / "truth.csv").read_text().splitlines()[1:]
+        queries = {int(line.split(",")[0]) for line in full}
+        self.assertEqual(again["positives"], len([query for query in queries if query % 2 == 0]))
 
     def test_a_trajectory_goes_by_the_times_of_the_frames(self):
-        data = self.scratch / "timed"
-        (data / "image_0").mkdir(parents=True)
-        for image in sorted(self.images.iterdir())[:20]:
-            shutil.copy(image, data / "image_0")
-        (data / "times.txt").write_text("".join(f"{0.1 * i:.3f}\n" for i in range(20)))
+        data = self.timed_images(20)
         poses = self.file("tum.txt", "".join(f"{100 if i > 25 else 0.05 * i:.3f} {i} 0 0 0 0 0 1\n"
                                              for i in range(40)))
         ran = loopbit("run", data, "--out", self.out, "--poses", poses)
@@ -134,15 +142,20 @@ class EvaluationCommandTest(CommandTest):
     def test_bad_truth_and_detections(self):
         truth = self.file("truth.csv", "5,1\n")
         matches = self.file("other.csv", "5,1\n")
+        poses = self.dataset / "poses.txt"
         cases = [
             (2, ["eval", matches], [matches, "--truth"]),
             (3, ["eval", self.scratch / "none", "--truth", truth], [self.scratch / "none"]),
             (3, ["eval", self.scratch, "--truth", truth], [self.scratch, "loops.csv"]),
             (3, ["eval", self.file("bad.csv", "5,x\n"), "--truth", truth], ["line 1", "5,x"]),
             (3, ["eval", matches, "--truth", self.file("short.mat", "MATLAB")], ["short.mat"]),
-            (2, ["eval", matches, "--truth", truth, "--truth-set", "radius_m=0"], ["radius_m", "0"]),
-            (2, ["eval", matches, "--truth", truth, "--truth-set", "metres=2"], ["metres"]),
-            (2, ["eval", matches, "--truth", truth, "--truth-set", "radius_m"], ["NAME=VALUE"]),
+            (2, ["eval", matches, "--truth", poses, "--truth-set", "radius_m=0"], ["radius_m", "0"]),
+            (2, ["eval", matches, "--truth", poses, "--truth-set", "metres=2"], ["metres"]),
+            (2, ["eval", matches, "--truth", poses, "--truth-set", "radius_m"], ["NAME=VALUE"]),
+            (2, ["eval", matches, "--truth", truth, "--truth-set", "radius_m=2"],
+             ["--truth-set", "poses", truth]),
+            (2, ["eval", matches, "--truth", poses, "--truth-views", 2], ["--truth-views", poses]),
+            (2, ["eval", matches, "--truth", truth, "--truth-variable", "x"], ["--truth-variable"]),
         ]
         for code, command, words in cases:
             with self.subTest(command=command):
@@ -159,10 +172,34 @@ class EvaluationCommandTest(CommandTest):
     def test_a_truth_that_fits_no_frame_costs_no_run(self):
         short = self.scratch / "short.mat"
         write_mat(short, "truth", 3, [(2, 0)])
-        ran = loopbit("run", self.few_images(), "--out", self.out, "--truth", short)
-        self.assert_fails(ran, 3, short, "14")
+        images = self.few_images()
+        self.assert_fails(loopbit("run", images, "--out", self.out, "--truth", short), 3, short,
+                          "14")
+        poses = self.file("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n" * 13)
+        for flag in ("--truth", "--poses"):
+            self.assert_fails(loopbit("run", images, "--out", self.out, flag, poses), 3, poses,
+                              "13 poses", "14 frames")
+        self.assertFalse(self.out.exists())
+
+    def timed_images(self, number):
+        """The first images of the world as KITTI's, ten a second."""
+        data = self.scratch / "timed"
+        (data / "image_0").mkdir(parents=True)
+        for image in sorted(self.images.iterdir())[:number]:
+            shutil.copy(image, data / "image_0")
+        (data / "times.txt").write_text("".join(f"{0.1 * i:.3f}\n" for i in range(number)))
+        return data
+
+    def test_what_is_found_wrong_after_a_run_costs_nothing_of_it(self):
+        data = self.timed_images(14)
+        late = self.file("late.txt", "1000 0 0 0 0 0 0 1\n")
+        ran = loopbit("run", data, "--out", self.out, "--truth", self.file("truth.csv", "5,1\n"),
+                      "--poses", late)
+        self.assert_fails(ran, 3, "1000")
         self.assertEqual(len(rows(self.out)), 14)
-        self.assertTrue((self.out / "run.json").exists())
+        record = json.loads((self.out / "run.json").read_text())
+        self.assertEqual((record["stopped_by"], record["score"]["positives"]), ("end", 1))
+        self.assertTrue((self.out / "report.html").exists())
 
     # report and compare
 
@@ -229,6 +266,55 @@ class EvaluationCommandTest(CommandTest):
         one = loopbit("compare", self.reference)
         self.assertEqual(one.returncode, 2)
         self.assertIn("RUN", one.stderr)
+
+    def test_the_order_of_runs_changes_no_number(self):
+        half = self.scratch / "half"
+        ran = loopbit("run", self.images, "--out", half, "--every", 2, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        matches = [f"{row['frame']},{row['match']},{row['score']}" for row in rows(half)
+                   if row["status"] == "loop"]
+        other = self.file("other.csv", "\n".join(matches[:len(matches) // 2]) + "\n")
+        truth = ["--truth", self.dataset / "truth.csv", "--not-false",
+                 self.dataset / "not_false.csv"]
+        expected = self.score(half, *truth)
+        tables = [{row["name"]: row for row in json.loads(
+            loopbit("compare", *runs, *truth, "--json").stdout)}
+                  for runs in ((half, other), (other, half))]
+        self.assertEqual(tables[0], tables[1])
+        self.assertEqual(tables[0]["half"]["recall"], expected["recall"])
+        self.assertEqual(tables[0]["other"]["positives"], expected["positives"])
+        self.assertEqual(tables[0]["other"]["wrong"], 0)
+        late = self.file("late.csv", f"{FRAMES},1\n")
+        self.assert_fails(loopbit("compare", late, half, *truth), 3, "late", str(FRAMES))
+
+    def test_another_detector_may_be_scored_by_a_trajectory(self):
+        data = self.timed_images(20)
+        poses = self.file("tum.txt", "".join(f"{0.1 * i:.3f} {i % 10} 0 0 0 0 0 1\n"
+                                             for i in range(20)))
+        ran = loopbit("run", data, "--out", self.out, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        truth = ["--truth", poses, "--truth-set", "min_gap_frames=5", "--truth-set", "radius_m=0.5"]
+        table = json.loads(loopbit("compare", self.file("other.csv", "15,5\n"), self.out, *truth,
+                                   "--json").stdout)
+        self.assertEqual((table[0]["positives"], table[0]["right"]), (10, 1))
+
+    def test_runs_that_read_other_frames_are_not_compared(self):
+        runs = [self.scratch / name for name in ("half", "first")]
+        for run, flags in zip(runs, (("--every", 2), ("--limit", FRAMES // 2))):
+            ran = loopbit("run", self.images, "--out", run, "--no-report", *flags)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assert_fails(loopbit("compare", *runs, "--truth", self.dataset / "truth.csv"), 3,
+                          "one frame in 2", "all frames")
+
+    def test_a_changed_record_is_named_or_passed_over(self):
+        folder = self.scratch / "run"
+        shutil.copytree(self.reference, folder)
+        for record in ('{"score": null}', '{"score": []}', '{"score": {"tolerance_frames": "x"}}',
+                       '{"input": "x"}', '{"score": {"protocol": "of old"}}'):
+            (folder / "run.json").write_text(record)
+            self.assertEqual(loopbit("eval", folder).returncode, 0, record)
+        (folder / "run.json").write_text('{"score"')
+        self.assert_fails(loopbit("eval", folder), 3, folder, "run.json")
 
     # reproduce
 

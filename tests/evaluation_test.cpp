@@ -105,6 +105,52 @@ TEST(Evaluate, ToleratedPairsArePreciseButRecallNoTruePair) {
   EXPECT_EQ(pairs.precision(), 0.75);
 }
 
+TEST(Evaluate, NobodyIsRightOrWrongAboutUnknownFrames) {
+  const GroundTruth truth{.same_place = {{10, 0, 0}, {11, 0, 0}}, .unknown = {4, 11}};
+  const Evaluation evaluation = evaluate(of_frames({loop(10, 4), loop(11, 3)}, 12), truth);
+  EXPECT_EQ(evaluation.decision.positives, 1);
+  EXPECT_EQ(evaluation.decision.tolerated, 1);
+  EXPECT_EQ(evaluation.decision.wrong, 0);
+  EXPECT_EQ(evaluation.decision.ignored, 2);
+  EXPECT_EQ(evaluate({{loop(10, 4), loop(11, 3)}, {}}, truth).decision.ignored, 1);
+}
+
+TEST(Evaluate, LoopsIntoOtherRecordingsAreNotJudged) {
+  const GroundTruth truth{.same_place = {{10, 0, 0}, {11, 0, 0}}};
+  MatchList list = of_frames({loop(11, 0)}, 12);
+  list.elsewhere = {10};
+  const Evaluation evaluation = evaluate(list, truth);
+  EXPECT_EQ(evaluation.decision.positives, 1);
+  EXPECT_EQ(evaluation.decision.right, 1);
+  EXPECT_EQ(evaluation.decision.ignored, 1);
+  EXPECT_TRUE(evaluation.missed.empty());
+  EXPECT_EQ(evaluation.pairs.positives, 1);
+}
+
+TEST(Evaluate, FramesLeftOutAreLeftOutOfTheTruth) {
+  // Of frames 0, 3, 6, ... of the sequence.
+  const GroundTruth truth{.same_place = {{30, 0, 4}, {31, 0, 9}, {33, 4, 5}, {36, 7, 7}},
+                          .near_place = {{36, 12, 12}},
+                          .ignored = {27, 28},
+                          .unknown = {15, 16},
+                          .every = 3};
+  const MatchList list = of_frames({loop(9, 8), loop(10, 1), loop(11, 1), loop(12, 4)}, 13);
+  Evaluation evaluation = evaluate(list, truth);
+  EXPECT_EQ(evaluation.decision.positives, 1) << "30: neither 4 to 5 nor 7 was read";
+  EXPECT_EQ(evaluation.decision.right, 1);
+  EXPECT_EQ(evaluation.decision.tolerated, 1);
+  EXPECT_EQ(evaluation.decision.wrong, 1);
+  EXPECT_EQ(evaluation.decision.ignored, 2);
+  EXPECT_EQ(evaluation.pairs.positives, 2) << "30 with 0 and 3";
+
+  evaluation = evaluate(list, truth, {.tolerance_frames = 1});
+  EXPECT_EQ(evaluation.decision.positives, 3) << "33 by 3 and 6, 36 by 6";
+  EXPECT_EQ(evaluation.decision.right, 2);
+  EXPECT_EQ(evaluation.missed, (std::vector<int>{12}));
+  EXPECT_EQ(evaluation.pairs.positives, 2);
+  EXPECT_EQ(evaluation.pairs.found, 1);
+}
+
 TEST(Evaluate, TheGreatestFrameNumbersDoNotOverflow) {
   constexpr int kLast = std::numeric_limits<int>::max();
   const GroundTruth truth{{{40, 0, kLast}, {41, 1, kLast}}, {}, {}};

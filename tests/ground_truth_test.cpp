@@ -59,6 +59,19 @@ TEST_F(GroundTruthTest, MissingAndUnwritableFilesAreNamed) {
   test::expect_error(ErrorKind::output, {nowhere}, [&] { write_place_runs(nowhere, "", {}); });
 }
 
+TEST_F(GroundTruthTest, PlacesAreEarlierFramesInTheColumnsTheirNamesSay) {
+  for (const char* row : {"5,5\n", "5,6\n", "5,1,5\n"}) {
+    test::expect_error(ErrorKind::input, {"line 1", "last < query"},
+                       [&] { read_place_runs(write("runs.csv", row)); });
+  }
+  for (const char* names : {"match,query\n", "first,last,query\n"}) {
+    test::expect_error(ErrorKind::input, {"line 1", "in order"},
+                       [&] { read_place_runs(write("runs.csv", names)); });
+  }
+  EXPECT_EQ(read_place_runs(write("runs.csv", "frame,match\n5,1\n")),
+            (std::vector<PlaceRun>{{5, 1, 1}}));
+}
+
 TEST(EveryNth, KeepsTheFramesThatWereRead) {
   const GroundTruth truth{
       {{30, 0, 2}, {30, 7, 8}, {31, 0, 9}, {33, 6, 10}}, {{30, 1, 2}, {33, 9, 9}}, {0, 1, 33}};

@@ -168,6 +168,19 @@ class MapCommandTest(CommandTest):
             watch.send_signal(signal.SIGINT)
             self.assertEqual(watch.wait(), 0)
 
+    def test_watch_answers_an_image_again_when_it_has_come_whole(self):
+        folder = self.scratch / "incoming"
+        folder.mkdir()
+        whole = (self.laps[0] / "000004.png").read_bytes()
+        with subprocess.Popen([LOOPBIT, "query", self.map, "--watch", folder, "--json"],
+                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.DEVNULL, text=True) as watch:
+            for bytes_there, status in ((len(whole) // 2, "unreadable"), (len(whole), "loop")):
+                (folder / "slow.png").write_bytes(whole[:bytes_there])
+                self.assertEqual(json.loads(watch.stdout.readline())["status"], status)
+            watch.send_signal(signal.SIGINT)
+            self.assertEqual(watch.wait(), 0)
+
     def test_watch_goes_on_when_an_image_is_gone_before_it_is_read(self):
         folder = self.few_images()
         first, *others = sorted(folder.iterdir())

@@ -53,6 +53,19 @@ TEST_F(MatchListTest, PassesOverCommentsBlankLinesAndMarks) {
   EXPECT_EQ(list.matches, (Matches{{40, 3, 1, true}, {42, 5, 1, true}}));
 }
 
+TEST_F(MatchListTest, LoopsIntoOtherRecordingsAreKnown) {
+  const MatchList list =
+      read("frame,status,match\n0,loop,1:7\n1,low_score,1:8\n2,loop,0\n3,no_geometry,\n");
+  EXPECT_EQ(list.matches, (Matches{{2, 0, 1, true}}));
+  EXPECT_EQ(list.elsewhere, (std::vector<int>{0}));
+}
+
+TEST_F(MatchListTest, AMatchIsAnEarlierFrame) {
+  for (const char* row : {"5,5\n", "5,6\n"}) {
+    test::expect_error(ErrorKind::input, {"line 1", "earlier"}, [&] { (void)read(row); });
+  }
+}
+
 TEST_F(MatchListTest, NothingIsAListToo) {
   EXPECT_TRUE(read("").matches.empty());
   EXPECT_TRUE(read("query,match\n").matches.empty());

@@ -53,6 +53,22 @@ class RecordedRunTest : public test::ScratchTest {
   }
 };
 
+TEST_F(RecordedRunTest, ARunThatIsCutOffTellsWhatItRead) {
+  RunRecord of_half = record();
+  of_half.every = 2;
+  ThreeViews source;
+  RecordedRun recorded(of_half, {path("run")});
+  recorded.detect(source, nobody(), false, kNeverStop);
+  const std::string begun = read_run(path("run")).record_json;
+  EXPECT_NE(begun.find("\"stopped_by\": \"running\""), std::string::npos) << begun;
+  EXPECT_NE(begun.find("\"every\": 2"), std::string::npos) << begun;
+  EXPECT_EQ(begun.find("\"counts\""), std::string::npos) << begun;
+  recorded.score({.same_place = {{4, 0, 0}}, .every = 2}, {});
+  const FinishedRun cut_off = read_run(path("run"));
+  EXPECT_EQ(cut_off.truth->same_place, (std::vector<PlaceRun>{{4, 0, 0}}));
+  EXPECT_EQ(cut_off.truth->every, 2);
+}
+
 TEST_F(RecordedRunTest, LeavesWhatItDetected) {
   ThreeViews source;
   RecordedRun recorded(record(), {path("run")});

@@ -58,7 +58,7 @@ TEST_F(RunFolderTest, NeverReplacesARunUnasked) {
 }
 
 TEST_F(RunFolderTest, OverwritingKeepsOtherFiles) {
-  RunFolder(path("run"), false).finish({});
+  RunFolder(path("run"), false).write_record({});
   (void)write("run/notes.txt", "mine");
   const RunFolder replaced(path("run"), true);
   EXPECT_TRUE(fs::exists(path("run/notes.txt")));
@@ -100,14 +100,14 @@ std::vector<Detection> four_detections() {
 }
 
 TEST_F(RunFolderTest, WhatWasWrittenIsRead) {
-  const GroundTruth truth{{{1, 0, 0}, {3, 0, 1}}, {{3, 0, 2}}, {2}};
+  const GroundTruth truth{{{1, 0, 0}, {3, 0, 1}}, {{3, 0, 2}}, {2}, {0}};
   const std::vector<std::optional<cv::Vec3d>> positions{cv::Vec3d(0.5, -2.0, 1e3), std::nullopt,
                                                         cv::Vec3d(1, 2, 3), cv::Vec3d(0, 0, 0)};
   RunFolder folder(path("run"), false);
   for (const Detection& detection : four_detections()) folder.add(detection);
   folder.write_truth(truth);
   folder.write_positions(positions);
-  folder.finish({});
+  folder.write_record({});
 
   const FinishedRun run = read_run(path("run"));
   ASSERT_EQ(run.detections.size(), 4U);
@@ -128,6 +128,8 @@ TEST_F(RunFolderTest, WhatWasWrittenIsRead) {
   EXPECT_EQ(run.truth->same_place, truth.same_place);
   EXPECT_EQ(run.truth->near_place, truth.near_place);
   EXPECT_EQ(run.truth->ignored, truth.ignored);
+  EXPECT_EQ(run.truth->unknown, truth.unknown);
+  EXPECT_EQ(run.truth->every, 1);
   EXPECT_EQ(run.positions_m, positions);
   EXPECT_NE(run.record_json.find("\"stopped_by\""), std::string::npos);
   EXPECT_EQ(run.evidence_path, "");
@@ -161,6 +163,12 @@ TEST_F(RunFolderTest, AChangedRowIsNamed) {
   expect_refused("0,,maybe,0,1,0,0,0,0,0,0,0", "'maybe'");
   expect_refused("0,,loop,x,1,0,0,0,0,0,0,0", "'x'");
   expect_refused("1,,loop,0,1,0,0,0,0,0,0,0", "'1'");
+  expect_refused("0,,loop,-7,1,0,0,0,0,0,0,0", "'-7'");
+  expect_refused("0,,loop,0,nan,0,0,0,0,0,0,0", "'nan'");
+  expect_refused("0,,loop,0,1,inf,0,0,0,0,0,0", "'inf'");
+  const std::string carried =
+      write("loops.csv", std::string(kLoopsHeader) + "\r\n0,,loop,0,1,0,0,0,0,0,0,0\r\n");
+  EXPECT_EQ(read_detections(carried).size(), 1U);
   test::expect_error(ErrorKind::input, {path("none"), "loops.csv"},
                      [&] { (void)read_run(path("none")); });
 }
@@ -181,7 +189,7 @@ TEST_F(RunFolderTest, AReplacedRunLeavesNothingBeside) {
     folder.write_positions({std::nullopt});
     (void)write("run/report.html", "old");
     (void)write("run/evidence.db-wal", "old");
-    folder.finish({});
+    folder.write_record({});
   }
   const RunFolder replaced(path("run"), true);
   EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 1);

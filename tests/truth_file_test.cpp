@@ -458,8 +458,67 @@ TEST_F(TruthFileTest, ReadsTrajectories) {
   const Times times_s{100.0, 100.2, 101.0, 102.2, 103.01, 200.0};
   const GroundTruth truth = read_truth(file, options, times_s);
   EXPECT_EQ(truth.same_place, (Runs{{3, 1, 1}, {4, 2, 2}}));
-  EXPECT_EQ(truth.ignored, (std::vector<int>{5}));
+  EXPECT_EQ(truth.unknown, (std::vector<int>{5}));
   expect_input_error(file, {"by time", "sequence"}, options);
+}
+
+TEST_F(TruthFileTest, ATrajectoryOfFramesWithoutTimesHasARowAFrame) {
+  std::string text;
+  for (int i = 0; i < 6; ++i) text += fmt::format("{} {} 0 0 0 0 0 1\n", 100 + i, 7 * (i % 3));
+  const std::string file = write("trajectory.txt", text);
+  TruthOptions options;
+  options.poses.min_gap_frames = 1;
+  EXPECT_EQ(read_truth(file, options, Times(5)).same_place,
+            (Runs{{3, 0, 0}, {4, 1, 1}, {5, 2, 2}}));
+  test::expect_error(ErrorKind::input, {"6 poses", "7 frames"},
+                     [&] { read_truth(file, options, Times(7)); });
+}
+
+TEST_F(TruthFileTest, TruthKeepsTheNumbersOfTheWholeSequence) {
+  TruthOptions options;
+  options.every = 3;
+  const GroundTruth listed = read_truth(write("truth.csv", "9,1,2\n"), options, Times(4));
+  EXPECT_EQ(listed.same_place, (Runs{{9, 1, 2}}));
+  EXPECT_EQ(listed.every, 3);
+
+  options.poses.min_gap_frames = 4;
+  const std::string row = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  const std::string kitti = write("poses.txt", row + row + row + row + row + row + row);
+  EXPECT_EQ(read_truth(kitti, options, Times(3)).same_place, (Runs{{5, 0, 0}, {6, 0, 1}}));
+  test::expect_error(ErrorKind::input, {"7 poses", "10 frames"},
+                     [&] { read_truth(kitti, options, Times(4)); });
+
+  std::string text;
+  for (int i = 0; i < 10; ++i) text += fmt::format("{} 0 0 0 0 0 0 1\n", 100 + i);
+  const std::string timed = write("trajectory.txt", text);
+  const GroundTruth by_time = read_truth(timed, options, {100.0, 103.0, 50.0, 109.0});
+  EXPECT_EQ(by_time.same_place, (Runs{{9, 0, 3}})) << "frames more than 4 apart, 0 and 3";
+  EXPECT_EQ(by_time.unknown, (std::vector<int>{6}));
+  EXPECT_EQ(by_time.every, 3);
+  options.every = 0;
+  test::expect_error(ErrorKind::option, {"every is 0"}, [&] { read_truth(timed, options); });
+}
+
+TEST_F(TruthFileTest, OfTwoViewsInTurnTheFirstMayBeReadAlone) {
+  const std::string file = path("mask.png");
+  cv::Mat mask = cv::Mat::zeros(8, 8, CV_8U);
+  mask.at<std::uint8_t>(7, 0) = 255;  // frame 3 as seen on the right, frame 0 on the left
+  cv::imwrite(file, mask);
+  TruthOptions options;
+  options.views = 2;
+  for (const int every : {1, 2}) {
+    options.every = every;
+    const GroundTruth truth = read_truth(file, options, Times(4));
+    EXPECT_EQ(truth.same_place, (Runs{{3, 0, 0}}));
+    EXPECT_EQ(truth.every, 1);
+  }
+  options.every = 3;
+  test::expect_error(ErrorKind::option, {"Every 3-th", "2 images"},
+                     [&] { read_truth(file, options, Times(2)); });
+  options = {};
+  options.every = 3;
+  test::expect_error(ErrorKind::input, {file, "8 frames", "has 10 frames"},
+                     [&] { read_truth(file, options, Times(4)); });
 }
 
 TEST_F(TruthFileTest, KindsAreTold) {

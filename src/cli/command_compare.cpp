@@ -16,6 +16,7 @@
 #include "open_page.hpp"
 #include "run_list.hpp"
 #include "session.hpp"
+#include "summary.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -35,11 +36,58 @@ struct Row {
   std::optional<TimeSummary> time;  ///< of all steps together; loopbit's runs only
 };
 
+/// Throws Error (kind input) where two runs are not about the same frames.
+void check_same_frames(const ListedRun& a, const ListedRun& b) {
+  const auto refuse = [&](const std::string& of_a, const std::string& of_b) {
+    throw Error(ErrorKind::input, fmt::format("'{}' has {}, but '{}' has {}; compare runs on the "
+                                              "same images.",
+                                              a.run.name, of_a, b.run.name, of_b));
+  };
+  const auto frames = [](const ListedRun& run) {
+    return fmt::format("{} frames", run.frames.times_s.size());
+  };
+  const auto every = [](const ListedRun& run) {
+    return run.frames.every == 1 ? std::string("all frames")
+                                 : fmt::format("one frame in {}", run.frames.every);
+  };
+  if (a.frames.times_s.size() != b.frames.times_s.size()) refuse(frames(a), frames(b));
+  if (a.run.run && b.run.run && a.frames.every != b.frames.every) refuse(every(a), every(b));
+}
+
+/// What all runs are about, by the first that knows it, a run of loopbit before others. A list that
+/// has no frames of its own gets those.
+FramesRead share_frames(std::vector<ListedRun>& runs) {
+  const ListedRun* known = nullptr;
+  for (const ListedRun& run : runs) {
+    if (!run.frames.times_s.empty() && (!known || (run.run.run && !known->run.run))) known = &run;
+  }
+  if (!known) return {};
+  for (const ListedRun& run : runs) {
+    if (!run.frames.times_s.empty()) check_same_frames(*known, run);
+    for (const ReportedMatch& match : run.run.list.matches) {
+      if (static_cast<std::size_t>(match.query) < known->frames.times_s.size()) continue;
+      throw Error(
+          ErrorKind::input,
+          fmt::format("'{}' tells of frame {}, but '{}' has {} frames; compare runs on the "
+                      "same images.",
+                      run.run.name, match.query, known->run.name, known->frames.times_s.size()));
+    }
+  }
+  FramesRead frames = known->frames;
+  for (ListedRun& run : runs) run.run.list.times_s = frames.times_s;
+  return frames;
+}
+
 /// The truth of the first run that has one is that of all: they are about the same images.
 std::vector<ReportRun> read_runs(const CompareFlags& flags) {
+  std::vector<ListedRun> listed;
+  listed.reserve(flags.runs.size());
+  for (const std::string& text : flags.runs) listed.push_back(listed_run(text));
+  const FramesRead frames = share_frames(listed);
   std::vector<ReportRun> runs;
-  runs.reserve(flags.runs.size());
-  for (const std::string& text : flags.runs) runs.push_back(report_run(text, flags.truth));
+  runs.reserve(listed.size());
+  for (ListedRun& run : listed) runs.push_back(std::move(run.run));
+  take_truth(runs.front(), flags.truth, frames);
   const auto judged = std::find_if(runs.begin(), runs.end(),
                                    [](const ReportRun& run) { return run.truth.has_value(); });
   if (judged == runs.end()) {
@@ -53,21 +101,6 @@ std::vector<ReportRun> read_runs(const CompareFlags& flags) {
   return runs;
 }
 
-void check_same_input(const std::vector<ReportRun>& runs) {
-  const ReportRun* first = nullptr;
-  for (const ReportRun& run : runs) {
-    if (!run.run) continue;
-    if (first && first->list.times_s.size() != run.list.times_s.size()) {
-      throw Error(
-          ErrorKind::input,
-          fmt::format("'{}' has {} frames, but '{}' has {}; compare runs on the same "
-                      "images.",
-                      first->name, first->list.times_s.size(), run.name, run.list.times_s.size()));
-    }
-    if (!first) first = &run;
-  }
-}
-
 Row row_of(const ReportRun& run) {
   Row row{run.name, evaluate(run.list, *run.truth, run.evaluation), std::nullopt};
   if (run.run) row.time = summarize(run.run->detections, total_ms);
@@ -78,13 +111,21 @@ void print_table(const std::vector<Row>& rows) {
   std::size_t width = 4;
   for (const Row& row : rows) width = std::max(width, row.name.size());
   fmt::print(
-      "{:<{}}  recall  precision  wrong  R@100%P  avg.prec.  pair recall   mean ms    p99 ms\n",
+      "{:<{}}  revisits  recall  precision  wrong  R@100%P  avg.prec.  pair recall   mean ms    "
+      "p99 "
+      "ms\n",
       "run", width);
   for (const Row& row : rows) {
     const Evaluation& e = row.evaluation;
-    fmt::print("{:<{}}  {:6.4f}     {:6.4f}  {:5}   {:6.4f}     {:6.4f}       {:6.4f}", row.name,
-               width, e.decision.recall(), e.decision.precision(), e.decision.wrong,
-               e.recall_at_full_precision, e.average_precision, e.pairs.recall());
+    const auto of_revisits = [&](double share) {
+      return share_text(share, e.decision.positives, 4);
+    };
+    fmt::print("{:<{}}  {:8}  {:>6}     {:>6}  {:5}   {:>6}     {:>6}       {:>6}", row.name, width,
+               e.decision.positives, of_revisits(e.decision.recall()),
+               share_text(e.decision.precision(), e.decision.right + e.decision.wrong, 4),
+               e.decision.wrong, of_revisits(e.recall_at_full_precision),
+               of_revisits(e.average_precision),
+               share_text(e.pairs.recall(), e.pairs.positives, 4));
     if (row.time) fmt::print("  {:8.2f}  {:8.2f}", row.time->mean, row.time->p99);
     fmt::print("\n");
   }
@@ -103,7 +144,6 @@ void print_json(const std::vector<Row>& rows) {
 
 void compare_command(const CompareFlags& flags) {
   const std::vector<ReportRun> runs = read_runs(flags);
-  check_same_input(runs);
   std::vector<Row> rows;
   rows.reserve(runs.size());
   for (const ReportRun& run : runs) rows.push_back(row_of(run));

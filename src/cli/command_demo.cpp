@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <memory>
 #include <utility>
 
@@ -42,7 +43,7 @@ Positions positions(const World& world, std::size_t frames) {
 
 void write_images(const World& world, const std::string& folder) {
   {
-    Progress progress(static_cast<std::size_t>(world.options().frames));
+    Progress progress(static_cast<std::size_t>(world.options().frames), false);
     write_dataset(world, folder, [&](int) { progress.advance(false); });
   }
   fmt::print(
@@ -51,7 +52,7 @@ void write_images(const World& world, const std::string& folder) {
       folder, world.options().frames, describe(world));
 }
 
-int demo_command(const DemoFlags& flags) {
+int demo_command(const DemoFlags& flags, const Arguments& arguments) {
   WorldOptions options = flags.world;
   for (const std::string& setting : flags.world_settings) {
     const auto [name, value] = split_setting(setting);
@@ -61,7 +62,7 @@ int demo_command(const DemoFlags& flags) {
                                                  name));
     }
   }
-  flags.truth.check();
+  flags.truth.check(1, static_cast<std::size_t>(std::max(0, options.frames)));
   const auto world = std::make_shared<const World>(options);
   if (!flags.images.empty()) {
     write_images(*world, flags.images);
@@ -70,10 +71,14 @@ int demo_command(const DemoFlags& flags) {
   Session session;
   session.source = make_world_source(world);
   session.input = "demo";
+  session.arguments = arguments;
   session.truth_files = flags.truth.files();
+  session.truth_description =
+      flags.truth.given() ? flags.truth.description() : "exact: the world is built in";
   session.evaluation = flags.truth.evaluation();
   session.truth = [&](const FrameTimes& times_s) {
-    const GroundTruth built_in{world->same_place(), world->near_place(), {}};
+    const GroundTruth built_in{.same_place = world->same_place(),
+                               .near_place = world->near_place()};
     return flags.truth.read_truth(times_s, 1).value_or(built_in);
   };
   session.positions = [&](const FrameTimes& times_s) { return positions(*world, times_s.size()); };
@@ -91,7 +96,7 @@ std::string list_world_settings() {
 
 }  // namespace
 
-void add_demo(CLI::App& app, int& exit_code) {
+void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
   auto flags = std::make_shared<DemoFlags>();
   CLI::App* command =
       app.add_subcommand("demo", "Find the loops of a drive through the built-in world");
@@ -118,7 +123,8 @@ void add_demo(CLI::App& app, int& exit_code) {
       ->type_name("DIR")
       ->excludes(out);
   flags->truth.add_to(*command);
-  command->callback([flags, &exit_code] { exit_code = demo_command(*flags); });
+  command->callback(
+      [flags, &arguments, &exit_code] { exit_code = demo_command(*flags, arguments); });
 }
 
 }  // namespace loopbit::cli

@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "run_list.hpp"
+#include "summary.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -25,11 +26,16 @@ struct EvalFlags {
 const char* plural(std::int64_t n) { return n == 1 ? "" : "s"; }
 
 void print_decision(const DecisionCounts& counts) {
-  const Interval interval = wilson_interval(counts.right, counts.right + counts.wrong);
-  fmt::print("decided    {} of {} revisits found: recall {:.4f}\n", counts.right, counts.positives,
-             counts.recall());
-  fmt::print("           {} wrong loop{}: precision {:.4f} (95 % interval {:.4f} to {:.4f})\n",
-             counts.wrong, plural(counts.wrong), counts.precision(), interval.low, interval.high);
+  const int judged = counts.right + counts.wrong;
+  fmt::print("decided    {} of {} revisits found: recall {}\n", counts.right, counts.positives,
+             share_text(counts.recall(), counts.positives, 4));
+  fmt::print("           {} wrong loop{}: precision {}", counts.wrong, plural(counts.wrong),
+             share_text(counts.precision(), judged, 4));
+  if (judged > 0) {
+    const Interval interval = wilson_interval(counts.right, judged);
+    fmt::print(" (95 % interval {:.4f} to {:.4f})", interval.low, interval.high);
+  }
+  fmt::print("\n");
   if (counts.tolerated + counts.ignored > 0) {
     fmt::print("           {} loop{} tolerated, {} quer{} ignored\n", counts.tolerated,
                plural(counts.tolerated), counts.ignored, counts.ignored == 1 ? "y" : "ies");
@@ -37,19 +43,32 @@ void print_decision(const DecisionCounts& counts) {
 }
 
 void print_pairs(const PairCounts& pairs) {
-  fmt::print("pairs      {} of {} true pairs found: recall {:.4f}; {} wrong: precision {:.4f}\n",
-             pairs.found, pairs.positives, pairs.recall(), pairs.wrong, pairs.precision());
+  fmt::print("pairs      {} of {} true pairs found: recall {}; {} wrong: precision {}\n",
+             pairs.found, pairs.positives, share_text(pairs.recall(), pairs.positives, 4),
+             pairs.wrong, share_text(pairs.precision(), pairs.right + pairs.wrong, 4));
 }
 
 void print_sweep(const Evaluation& evaluation) {
+  if (evaluation.decision.positives == 0) {
+    fmt::print("swept      nothing: there is no revisit to find\n");
+    return;
+  }
   if (evaluation.score_at_full_precision) {
-    fmt::print("swept      recall {:.4f} at 100 % precision (score {:g} or more)\n",
+    fmt::print("swept      recall {:.4f} at 100 % precision (score {} or more)\n",
                evaluation.recall_at_full_precision, *evaluation.score_at_full_precision);
   } else {
     fmt::print("swept      recall 0 at 100 % precision: {}\n",
                evaluation.curve.empty() ? "there are no matches" : "the highest score is wrong");
   }
   fmt::print("           average precision {:.4f}\n", evaluation.average_precision);
+}
+
+/// Its name, and what it is, unless a run was scored by one that is not known here.
+std::string described(const std::string& protocol) {
+  for (const Protocol& known : protocols()) {
+    if (known.name == protocol) return fmt::format("{}: {}", known.name, known.help);
+  }
+  return protocol;
 }
 
 void print_wrong(const std::vector<ReportedMatch>& wrong) {
@@ -71,7 +90,7 @@ void eval_command(const EvalFlags& flags) {
     return;
   }
   if (const std::string& protocol = run.evaluation.protocol; !protocol.empty()) {
-    fmt::print("protocol   {}: {}\n", protocol, find_protocol(protocol).help);
+    fmt::print("protocol   {}\n", described(protocol));
   }
   if (run.evaluation.tolerance_frames > 0) {
     fmt::print("tolerance  {} frames\n", run.evaluation.tolerance_frames);

@@ -137,12 +137,14 @@ std::optional<PublicSet> find_set(const fs::path& data, const PaperRow& row) {
 }
 
 /// Runs one set into a folder of its own. Returns the exit code.
-int run_set(const PublicSet& set, const SessionFlags& flags) {
+int run_set(const PublicSet& set, const SessionFlags& flags, const Arguments& arguments) {
   Session session;
-  set.truth.check();
+  set.truth.check(1, std::nullopt);
   session.source = subsample(open_source(set.images), static_cast<std::size_t>(set.every), 0);
   session.input = set.images;
+  session.arguments = arguments;
   session.truth_files = set.truth.files();
+  session.truth_description = set.truth.description();
   session.every = set.every;
   session.evaluation = set.truth.evaluation();
   // The matrix is in the numbers of the images that are read.
@@ -176,7 +178,7 @@ void print_table(const std::vector<ReproducedRow>& rows) {
   }
 }
 
-int reproduce_command(const ReproduceFlags& flags) {
+int reproduce_command(const ReproduceFlags& flags, const Arguments& arguments) {
   std::vector<ReproducedRow> rows;
   std::string missing;
   for (const PaperRow& paper : kPaper) {
@@ -189,7 +191,8 @@ int reproduce_command(const ReproduceFlags& flags) {
     session.out =
         (fs::path(flags.session.out) / letters_and_digits(std::string(paper.name))).string();
     fmt::print("\n{}\n", paper.name);
-    if (const int exit_code = run_set(*set, session); exit_code != success) return exit_code;
+    if (const int exit_code = run_set(*set, session, arguments); exit_code != success)
+      return exit_code;
     rows.push_back({&paper, report_run(session.out)});
   }
   if (rows.empty()) {
@@ -205,7 +208,7 @@ int reproduce_command(const ReproduceFlags& flags) {
 
 }  // namespace
 
-void add_reproduce(CLI::App& app, int& exit_code) {
+void add_reproduce(CLI::App& app, const Arguments& arguments, int& exit_code) {
   auto flags = std::make_shared<ReproduceFlags>();
   CLI::App* command =
       app.add_subcommand("reproduce", "Run the tables of the paper on the public data sets");
@@ -221,7 +224,8 @@ void add_reproduce(CLI::App& app, int& exit_code) {
       "  City Centre, New College: a folder CityCentre or NewCollege with Images and a .mat file\n"
       "    whose name says truth; scored by its cells\n"
       "What is not there is named and left out.");
-  command->callback([flags, &exit_code] { exit_code = reproduce_command(*flags); });
+  command->callback(
+      [flags, &arguments, &exit_code] { exit_code = reproduce_command(*flags, arguments); });
 }
 
 }  // namespace loopbit::cli

@@ -1,6 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <filesystem>
 #include <memory>
+#include <optional>
+#include <system_error>
 #include <utility>
 
 #include "loopbit/error.hpp"
@@ -20,12 +23,21 @@ struct RunFlags {
   TruthFlags truth;
 };
 
-int run_command(const RunFlags& flags) {
+/// How many frames of `input` will be read, where that is sure: a video says about how many.
+std::optional<std::size_t> known_frames(const std::string& input, const ImageSource& source) {
+  std::error_code error;
+  const bool is_folder = std::filesystem::is_directory(input, error);
+  return is_folder ? source.size() : std::nullopt;
+}
+
+int run_command(const RunFlags& flags, const Arguments& arguments) {
   Session session;
   if (flags.session.out.empty() && flags.session.map.empty()) {
     throw Error(ErrorKind::option, "Where to? Name a folder by --out, a map by --map, or both.");
   }
-  flags.truth.check();
+  session.source = subsample(open_source(flags.input), static_cast<std::size_t>(flags.every),
+                             static_cast<std::size_t>(flags.limit));
+  flags.truth.check(flags.every, known_frames(flags.input, *session.source));
   session.evaluation = flags.truth.evaluation();
   session.truth = [&](const FrameTimes& times_s) {
     return flags.truth.read_truth(times_s, flags.every);
@@ -33,10 +45,10 @@ int run_command(const RunFlags& flags) {
   session.positions = [&](const FrameTimes& times_s) {
     return flags.truth.read_positions(times_s, flags.every);
   };
-  session.source = subsample(open_source(flags.input), static_cast<std::size_t>(flags.every),
-                             static_cast<std::size_t>(flags.limit));
   session.input = flags.input;
+  session.arguments = arguments;
   session.truth_files = flags.truth.files();
+  session.truth_description = flags.truth.description();
   session.every = flags.every;
   session.limit = flags.limit;
   return run_session(std::move(session), flags.session);
@@ -44,7 +56,7 @@ int run_command(const RunFlags& flags) {
 
 }  // namespace
 
-void add_run(CLI::App& app, int& exit_code) {
+void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   auto flags = std::make_shared<RunFlags>();
   CLI::App* command = app.add_subcommand("run", "Find the loops in a sequence of images");
   command
@@ -68,7 +80,8 @@ void add_run(CLI::App& app, int& exit_code) {
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
   command->footer(list_truth_settings());
-  command->callback([flags, &exit_code] { exit_code = run_command(*flags); });
+  command->callback(
+      [flags, &arguments, &exit_code] { exit_code = run_command(*flags, arguments); });
 }
 
 }  // namespace loopbit::cli

@@ -4,6 +4,7 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -20,15 +21,17 @@ enum ExitCode : int {
 };
 
 /// Each adds a sub-command to `app` that leaves its exit code in `exit_code` and throws
-/// loopbit::Error.
-void add_run(CLI::App& app, int& exit_code);
-void add_demo(CLI::App& app, int& exit_code);
+/// loopbit::Error. `arguments`: all of the command line after the program's name, for the record of
+/// a run.
+using Arguments = std::vector<std::string>;
+void add_run(CLI::App& app, const Arguments& arguments, int& exit_code);
+void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code);
 void add_query(CLI::App& app, int& exit_code);
 void add_map(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_report(CLI::App& app);
-void add_reproduce(CLI::App& app, int& exit_code);
+void add_reproduce(CLI::App& app, const Arguments& arguments, int& exit_code);
 void add_options(CLI::App& app);
 
 /// "NAME=VALUE" in two. Throws Error (kind option) without a "=".

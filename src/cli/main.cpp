@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -61,14 +62,15 @@ int run_command_line(int argc, char** argv) {
   app.set_version_flag("--version", loopbit::kVersion);
   app.require_subcommand(1);
   int exit_code = cli::success;
-  cli::add_run(app, exit_code);
-  cli::add_demo(app, exit_code);
+  const cli::Arguments arguments(argv + std::min(argc, 1), argv + argc);
+  cli::add_run(app, arguments, exit_code);
+  cli::add_demo(app, arguments, exit_code);
   cli::add_query(app, exit_code);
   cli::add_map(app, exit_code);
   cli::add_eval(app);
   cli::add_compare(app);
   cli::add_report(app);
-  cli::add_reproduce(app, exit_code);
+  cli::add_reproduce(app, arguments, exit_code);
   cli::add_options(app);
   check_command(app, "loopbit", 1, argc, argv);
   try {

@@ -28,8 +28,8 @@ std::string clock_time(double seconds) {
 
 }  // namespace
 
-Progress::Progress(std::optional<std::size_t> total)
-    : total_(total), on_terminal_(isatty(STDERR_FILENO) != 0) {}
+Progress::Progress(std::optional<std::size_t> total, bool of_detection)
+    : total_(total), of_detection_(of_detection), on_terminal_(isatty(STDERR_FILENO) != 0) {}
 
 Progress::~Progress() {
   clear_line();
@@ -65,7 +65,8 @@ std::string Progress::line() const {
   if (total_ && *total_ >= frames_) {
     text += fmt::format(", {} left", clock_time(static_cast<double>(*total_ - frames_) / rate));
   }
-  return text + fmt::format(", {} loop{}", loops_, loops_ == 1 ? "" : "s");
+  if (of_detection_) text += fmt::format(", {} loop{}", loops_, loops_ == 1 ? "" : "s");
+  return text;
 }
 
 std::string Progress::bar() const {

@@ -13,8 +13,8 @@ namespace loopbit::cli {
 /// every few seconds.
 class Progress {
  public:
-  /// `total`: frames in all, where known.
-  explicit Progress(std::optional<std::size_t> total);
+  /// `total`: frames in all, where known. `of_detection`: loops are counted, too.
+  explicit Progress(std::optional<std::size_t> total, bool of_detection = true);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -35,6 +35,7 @@ class Progress {
   void clear_line() const;
 
   const std::optional<std::size_t> total_;
+  const bool of_detection_;
   const bool on_terminal_;
   const Clock::time_point start_ = Clock::now();
   Clock::time_point last_shown_ = start_;

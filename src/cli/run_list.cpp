@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include "run_list.hpp"
 
+#include <algorithm>
 #include <filesystem>
+#include <string>
 #include <system_error>
 #include <utility>
 
@@ -32,46 +34,66 @@ std::pair<std::string, std::string> name_and_path(const std::string& text) {
   return {is_folder(text) ? last.filename().string() : last.stem().string(), text};
 }
 
-/// How the run in a folder was scored when it ended.
-void take_scoring(const nlohmann::json& record, ReportRun& run) {
-  const auto score = record.find("score");
-  if (score == record.end()) return;
-  run.evaluation.tolerance_frames = score->value("tolerance_frames", 0);
-  if (score->contains("protocol") && (*score)["protocol"].is_string()) {
-    run.evaluation.protocol = (*score)["protocol"];
+using Json = nlohmann::json;
+
+/// Throws Error where the record of a run is none.
+Json record_of(const FinishedRun& run) {
+  if (run.record_json.empty()) return Json::object();
+  Json record = Json::parse(run.record_json, nullptr, false);
+  if (record.is_object()) return record;
+  throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is no record of a run: it was "
+                                            "changed after loopbit wrote it; run again.",
+                                            run.path));
+}
+
+/// What stands at `path` in a record, such as "/input/every"; `otherwise` where nothing of that
+/// type does.
+template <typename Value>
+Value value_at(const Json& record, const char* path, Value otherwise) {
+  try {
+    return record.value(Json::json_pointer(path), otherwise);
+  } catch (const Json::exception&) {
+    return otherwise;
   }
 }
 
 }  // namespace
 
-ReportRun report_run(const std::string& text, const TruthFlags& flags) {
+ListedRun listed_run(const std::string& text) {
   const auto [name, path] = name_and_path(text);
-  ReportRun run;
+  ListedRun listed;
+  ReportRun& run = listed.run;
   run.name = name;
-  int every = 1;
   if (is_folder(path)) {
     run.run = read_run(path);
     run.list = match_list(run.run->detections);
     run.truth = run.run->truth;
     run.positions_m = run.run->positions_m;
-    const auto record = nlohmann::json::parse(run.run->record_json, nullptr, false);
-    if (record.is_object()) {
-      take_scoring(record, run);
-      if (const auto input = record.find("input"); input != record.end()) {
-        every = input->value("every", 1);
-      }
-    }
+    const Json record = record_of(*run.run);
+    run.evaluation.tolerance_frames = value_at(record, "/score/tolerance_frames", 0);
+    run.evaluation.protocol = value_at(record, "/score/protocol", std::string());
+    listed.frames.every = std::max(1, value_at(record, "/input/every", 1));
   } else {
     run.list = read_match_list(path);
   }
-  if (auto positions = flags.read_positions(run.list.times_s, every); !positions.empty()) {
+  listed.frames.times_s = run.list.times_s;
+  return listed;
+}
+
+void take_truth(ReportRun& run, const TruthFlags& flags, const FramesRead& frames) {
+  if (auto positions = flags.read_positions(frames.times_s, frames.every); !positions.empty()) {
     run.positions_m = std::move(positions);
   }
   if (flags.given()) {
-    run.truth = flags.read_truth(run.list.times_s, every);
+    run.truth = flags.read_truth(frames.times_s, frames.every);
     run.evaluation = flags.evaluation();
   }
-  return run;
+}
+
+ReportRun report_run(const std::string& text, const TruthFlags& flags) {
+  ListedRun listed = listed_run(text);
+  take_truth(listed.run, flags, listed.frames);
+  return std::move(listed.run);
 }
 
 ReportRun scored_run(const std::string& text, const TruthFlags& flags) {

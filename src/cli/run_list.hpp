@@ -11,9 +11,27 @@
 
 namespace loopbit::cli {
 
+/// What was read of a sequence of images, where it is known.
+struct FramesRead {
+  int every = 1;       ///< of the input's frames
+  FrameTimes times_s;  ///< one a frame; empty of a detector that lists matches only
+};
+
+/// A run, and the frames that it is about.
+struct ListedRun {
+  ReportRun run;
+  FramesRead frames;
+};
+
 /// What PATH or NAME=PATH says: a run folder, with the truth it was given, or a CSV of any
-/// detector's matches. Flags that name a truth or poses come before those of the folder. Throws
-/// Error.
+/// detector's matches. Throws Error.
+ListedRun listed_run(const std::string& text);
+
+/// Gives `run` the truth and the poses that the flags name, if any, before those of its folder, as
+/// they are of `frames`. Throws Error.
+void take_truth(ReportRun& run, const TruthFlags& flags, const FramesRead& frames);
+
+/// listed_run with the truth and the poses of its own frames.
 ReportRun report_run(const std::string& text, const TruthFlags& flags = {});
 
 /// As report_run, but an Error (kind option) where there is no truth.

@@ -21,6 +21,7 @@
 #include "ranges.hpp"
 #include "run_list.hpp"
 #include "stop_signal.hpp"
+#include "streams.hpp"
 #include "summary.hpp"
 
 namespace loopbit::cli {
@@ -88,12 +89,25 @@ void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
   recorded.detect(source, listener, keep_evidence, stop);
 }
 
-void score(const Session& session, RecordedRun& recorded) {
+/// Returns what went wrong: the run itself is none the worse for it.
+std::optional<Error> score(const Session& session, RecordedRun& recorded) {
   const FrameTimes times_s = match_list(recorded.folder().detections()).times_s;
-  if (const auto positions = session.positions(times_s); !positions.empty()) {
-    recorded.keep_positions(positions);
-  }
-  if (const auto truth = session.truth(times_s)) recorded.score(*truth, session.evaluation);
+  std::optional<Error> fault;
+  const auto attempt = [&](const auto& step) {
+    try {
+      step();
+    } catch (const Error& error) {
+      if (!fault) fault = error;
+    }
+  };
+  attempt([&] {
+    if (const auto truth = session.truth(times_s)) recorded.score(*truth, session.evaluation);
+  });
+  attempt([&] {
+    const auto positions = session.positions(times_s);
+    if (!positions.empty()) recorded.keep_positions(positions);
+  });
+  return fault;
 }
 
 }  // namespace
@@ -157,7 +171,9 @@ int run_session(Session session, const SessionFlags& flags) {
                         .every = session.every,
                         .limit = session.limit,
                         .threads = threads,
-                        .map_path = flags.map},
+                        .map_path = flags.map,
+                        .arguments = session.arguments,
+                        .truth = session.truth_description},
                        {flags.out, flags.overwrite, flags.keep_images, inputs});
   cv::setNumThreads(threads);
   if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
@@ -165,7 +181,6 @@ int run_session(Session session, const SessionFlags& flags) {
     drive(*session.source, recorded, !flags.no_report, stop_requested);
     warn_of_damage(flags.map, recorded.map_damage());
     if (!stop_requested) check_readable(recorded.folder().detections(), session.input);
-    score(session, recorded);
   } catch (const Error& error) {
     try {
       recorded.finish(error.what());
@@ -173,11 +188,14 @@ int run_session(Session session, const SessionFlags& flags) {
     }
     throw;
   }
+  const std::optional<Error> fault = score(session, recorded);
   recorded.finish(stop_requested ? "interrupt" : "end");
   const RunFolder& folder = recorded.folder();
   if (!flags.no_report)
     write_report(folder.report_path(), {report_run(folder.path())}, flags.report);
   print_summary(recorded.record(), folder, !flags.no_report);
+  if (fault && !stop_requested) throw *fault;
+  if (fault) tell(fmt::format("loopbit: {}\n", fault->what()));
   return stop_requested ? interrupted : success;
 }
 

@@ -42,7 +42,9 @@ struct SessionFlags {
 struct Session {
   std::unique_ptr<ImageSource> source;
   std::string input;                          ///< for run.json and the summary
+  std::vector<std::string> arguments = {};    ///< of the command line, for run.json
   std::vector<std::string> truth_files = {};  ///< see TruthFlags::files
+  std::string truth_description = {};         ///< what says what is true; empty = nothing does
   int every = 1;
   int limit = 0;
   // Asked with the frames' times when the run is over.

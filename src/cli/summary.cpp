@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "loopbit/finished_run.hpp"
+
 namespace loopbit::cli {
 namespace {
 
@@ -31,10 +33,11 @@ void print_reasons(const std::vector<Detection>& detections) {
 }
 
 void print_score(const DecisionCounts& score) {
-  fmt::print(
-      "truth      {} of {} revisits found: recall {:.3f}; {} wrong loop{}: precision {:.3f}\n",
-      score.right, score.positives, score.recall(), score.wrong, score.wrong == 1 ? "" : "s",
-      score.precision());
+  fmt::print("truth      {} of {} revisits found: recall {}; {} wrong loop{}: precision {}\n",
+             score.right, score.positives, share_text(score.recall(), score.positives, 3),
+             score.wrong, score.wrong == 1 ? "" : "s",
+             share_text(score.precision(), score.right + score.wrong, 3));
+  if (score.ignored > 0) fmt::print("           {} frames are not scored\n", score.ignored);
 }
 
 void print_times(const RunRecord& record, const std::vector<Detection>& detections) {
@@ -49,12 +52,18 @@ void print_times(const RunRecord& record, const std::vector<Detection>& detectio
 
 }  // namespace
 
+std::string share_text(double share, std::int64_t whole, int decimals) {
+  return whole == 0 ? "-" : fmt::format("{:.{}f}", share, decimals);
+}
+
 void print_summary(const RunRecord& record, const RunFolder& folder, bool has_report) {
   const auto& detections = folder.detections();
   fmt::print("input      {} ({}), {} frames{}\n", record.input, record.description,
              detections.size(), record.stopped_by == "interrupt" ? ", then interrupted" : "");
   const auto loops = count(detections, Status::loop);
-  fmt::print("loops      {} frame{} at a place seen before\n", loops, loops == 1 ? "" : "s");
+  const auto elsewhere = match_list(detections).elsewhere.size();
+  fmt::print("loops      {} frame{} at a place seen before{}\n", loops, loops == 1 ? "" : "s",
+             elsewhere == 0 ? "" : fmt::format(", {} in earlier sessions of the map", elsewhere));
   print_reasons(detections);
   if (record.score) print_score(record.score->decision);
   print_times(record, detections);

@@ -34,15 +34,20 @@ bool has_times(const std::vector<CameraPose>& poses) {
                      [](const CameraPose& pose) { return pose.timestamp_s.has_value(); });
 }
 
-/// The rows of the frames that were read, where row and frame go together by number.
-std::vector<CameraPose> rows_read(const std::vector<CameraPose>& poses, std::size_t frames,
-                                  int every) {
+/// The rows of the frames that were read, where row and frame go together by number. Throws Error
+/// (kind input) if they are too few.
+std::vector<CameraPose> rows_read(const std::string& file, const std::vector<CameraPose>& poses,
+                                  std::size_t frames, int every) {
   std::vector<CameraPose> rows;
   rows.reserve(frames);
   const auto step = static_cast<std::size_t>(every);
-  for (std::size_t row = 0; row < poses.size() && rows.size() < frames; row += step) {
-    rows.push_back(poses[row]);
+  if (frames > 0 && (frames - 1) * step >= poses.size()) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' has {} poses, but the sequence has {} frames: give a pose for "
+                            "each, or leave it out.",
+                            file, poses.size(), (frames - 1) * step + 1));
   }
+  for (std::size_t row = 0; rows.size() < frames; row += step) rows.push_back(poses[row]);
   return rows;
 }
 
@@ -109,7 +114,7 @@ EvaluationOptions TruthFlags::evaluation() const {
   return named.evaluation();
 }
 
-TruthOptions TruthFlags::truth_options() const {
+TruthOptions TruthFlags::truth_options(int every) const {
   TruthOptions options;
   options.views = views;
   for (const std::string& setting : settings) {
@@ -123,55 +128,82 @@ TruthOptions TruthFlags::truth_options() const {
   }
   if (!protocol.empty()) options = find_protocol(protocol).truth;
   options.variable = variable;
+  options.every = every;
   return options;
 }
 
-void TruthFlags::check() const {
+void TruthFlags::check(int every, std::optional<std::size_t> frames) const {
   (void)evaluation();
-  (void)truth_options();
-  // A trajectory can be read only with the times of the frames.
-  if (const std::string file = poses_file(); !file.empty()) (void)read_poses(file);
-  if (!given()) return;
-  if (const TruthKind kind = truth_kind(truth); kind == TruthKind::poses) {
-    check_protocol(kind);
-    (void)read_others(1);
-  } else {
-    (void)read_truth({}, 1);
+  (void)truth_options(every);
+  if (const std::string file = poses_file(); !file.empty()) {
+    const std::vector<CameraPose> rows = read_poses(file);
+    if (!has_times(rows) && frames) (void)rows_read(file, rows, *frames, every);
   }
-}
-
-void TruthFlags::check_protocol(TruthKind kind) const {
-  if (protocol.empty() || find_protocol(protocol).truth_kind == kind) return;
-  throw Error(
-      ErrorKind::option,
-      fmt::format("--protocol {} is defined on {}, but '{}' is {}; name another file, or "
-                  "leave out the protocol.",
-                  protocol, name_of(find_protocol(protocol).truth_kind), truth, name_of(kind)));
-}
-
-GroundTruth TruthFlags::read_others(int every) const {
+  if (!given()) return;
+  const TruthKind kind = truth_kind(truth);
+  check_kind(kind);
   GroundTruth others;
-  if (!not_false.empty()) others.near_place = read_place_runs(not_false);
-  if (!ignore.empty()) others.ignored = read_frame_list(ignore);
-  return every_nth(others, every);
+  add_others(others);
+  // What poses say needs the times of the frames.
+  if (kind != TruthKind::poses) (void)read_truth(FrameTimes(frames.value_or(0)), every);
+}
+
+std::string TruthFlags::description() const {
+  if (!given()) return "";
+  switch (truth_kind(truth)) {
+    case TruthKind::runs:
+      return fmt::format("as {} lists it", truth);
+    case TruthKind::matrix:
+      return fmt::format("the cells of {}", truth);
+    case TruthKind::poses:
+      break;
+  }
+  const PoseTruthOptions of_poses = truth_options(1).poses;
+  std::string text = fmt::format("by {}: at most {} m and more than {} frames apart", truth,
+                                 of_poses.radius_m, of_poses.min_gap_frames);
+  if (of_poses.min_path_m > 0) text += fmt::format(", {} m driven in between", of_poses.min_path_m);
+  if (of_poses.max_heading_deg < 180) {
+    text += fmt::format(", headings within {} degrees", of_poses.max_heading_deg);
+  }
+  return text;
+}
+
+void TruthFlags::check_kind(TruthKind kind) const {
+  if (!protocol.empty() && find_protocol(protocol).truth_kind != kind) {
+    throw Error(
+        ErrorKind::option,
+        fmt::format("--protocol {} is defined on {}, but '{}' is {}; name another file, or "
+                    "leave out the protocol.",
+                    protocol, name_of(find_protocol(protocol).truth_kind), truth, name_of(kind)));
+  }
+  const auto check_flag = [&](bool is_given, const char* flag, const char* things, bool fits) {
+    if (!is_given || fits) return;
+    throw Error(ErrorKind::option,
+                fmt::format("{} is about {}, but '{}' is {}; leave it out, or name another file.",
+                            flag, things, truth, name_of(kind)));
+  };
+  const bool is_matrix = kind == TruthKind::matrix;
+  check_flag(!settings.empty(), "--truth-set", "poses", kind == TruthKind::poses);
+  check_flag(views != 1, "--truth-views", "a loop matrix", is_matrix);
+  check_flag(!variable.empty(), "--truth-variable", "a loop matrix in a .mat file", is_matrix);
+}
+
+void TruthFlags::add_others(GroundTruth& result) const {
+  if (!not_false.empty()) {
+    const std::vector<PlaceRun> runs = read_place_runs(not_false);
+    result.near_place.insert(result.near_place.end(), runs.begin(), runs.end());
+  }
+  if (!ignore.empty()) {
+    const std::vector<int> frames = read_frame_list(ignore);
+    result.ignored.insert(result.ignored.end(), frames.begin(), frames.end());
+  }
 }
 
 std::optional<GroundTruth> TruthFlags::read_truth(const FrameTimes& times_s, int every) const {
   if (!given()) return std::nullopt;
-  const TruthKind kind = truth_kind(truth);
-  check_protocol(kind);
-  // A trajectory goes by the frames' times, all else by their numbers in the whole sequence.
-  const bool goes_by_time = kind == TruthKind::poses && has_times(read_poses(truth));
-  GroundTruth result;
-  if (goes_by_time || every == 1) {
-    result = loopbit::read_truth(truth, truth_options(), times_s);
-  } else {
-    result = every_nth(loopbit::read_truth(truth, truth_options()), every);
-  }
-  const GroundTruth others = read_others(every);
-  result.near_place.insert(result.near_place.end(), others.near_place.begin(),
-                           others.near_place.end());
-  result.ignored.insert(result.ignored.end(), others.ignored.begin(), others.ignored.end());
+  check_kind(truth_kind(truth));
+  GroundTruth result = loopbit::read_truth(truth, truth_options(every), times_s);
+  add_others(result);
   return result;
 }
 
@@ -185,11 +217,18 @@ Positions TruthFlags::read_positions(const FrameTimes& times_s, int every) const
   if (file.empty()) return {};
   std::vector<CameraPose> rows = read_poses(file);
   if (times_s.empty() && has_times(rows)) return {};
-  const std::size_t frames = times_s.empty() ? rows.size() : times_s.size();
-  if (!has_times(rows)) rows = rows_read(rows, frames, every);
+  const auto has_time = [](const auto& time) { return time.has_value(); };
+  const bool by_time = has_times(rows) && std::any_of(times_s.begin(), times_s.end(), has_time);
+  if (!by_time) {
+    if (!times_s.empty()) rows = rows_read(file, rows, times_s.size(), every);
+    Positions positions;
+    positions.reserve(rows.size());
+    for (const CameraPose& row : rows) positions.emplace_back(row.position_m);
+    return positions;
+  }
   Positions positions;
-  positions.reserve(frames);
-  for (const auto& pose : poses_of_frames(rows, times_s.empty() ? FrameTimes(frames) : times_s)) {
+  positions.reserve(times_s.size());
+  for (const auto& pose : poses_of_frames(rows, times_s)) {
     positions.push_back(pose ? std::optional(pose->position_m) : std::nullopt);
   }
   return positions;

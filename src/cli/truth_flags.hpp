@@ -44,11 +44,14 @@ struct TruthFlags {
   [[nodiscard]] EvaluationOptions evaluation() const;
 
   /// Throws what read_truth() and read_positions() would, as far as can be told before the frames
-  /// are known.
-  void check() const;
+  /// are read: of the sequence every `every`-th will be, so many of them if that is known.
+  void check(int every, std::optional<std::size_t> frames) const;
 
-  /// What is true about the frames read, if a file was named; of the sequence in that file every
-  /// `every`-th frame was read.
+  /// One line that says what is true; empty if no file was named.
+  [[nodiscard]] std::string description() const;
+
+  /// What is true about the sequence, if a file was named, of which every `every`-th frame was
+  /// read.
   [[nodiscard]] std::optional<GroundTruth> read_truth(const FrameTimes& times_s, int every) const;
 
   /// Where the camera was, if poses were named, as such or as the truth; else nothing. Where the
@@ -56,12 +59,12 @@ struct TruthFlags {
   [[nodiscard]] Positions read_positions(const FrameTimes& times_s, int every) const;
 
  private:
-  [[nodiscard]] TruthOptions truth_options() const;
+  [[nodiscard]] TruthOptions truth_options(int every) const;
   [[nodiscard]] std::string poses_file() const;
-  /// What --not-false and --ignore say, of every `every`-th frame.
-  [[nodiscard]] GroundTruth read_others(int every) const;
-  /// Throws Error (kind option) if the protocol is not defined on `kind`.
-  void check_protocol(TruthKind kind) const;
+  /// Adds what --not-false and --ignore say.
+  void add_others(GroundTruth& result) const;
+  /// Throws Error (kind option) if the protocol or a flag is not defined on `kind`.
+  void check_kind(TruthKind kind) const;
 
   CLI::Option* fixed_by_protocol_[3] = {};
 };

@@ -34,12 +34,17 @@ std::vector<std::string> FolderWatch::arrived() {
     if (name.starts_with('.') || !datasets::is_image_name(name)) continue;
     std::error_code vanished;
     const std::uintmax_t bytes = fs::file_size(entry->path(), vanished);
+    const fs::file_time_type written =
+        vanished ? fs::file_time_type() : entry->last_write_time(vanished);
     if (vanished) continue;
-    const auto [found, is_new] = files_.try_emplace(name);
+    const auto [found, is_new] = files_.try_emplace(name, File{bytes, written});
     File& file = found->second;
-    const bool settled = !is_new && bytes > 0 && file.bytes == bytes;
-    file.bytes = bytes;
-    if (file.given || !settled) continue;
+    const bool settled = !is_new && bytes > 0 && file.bytes == bytes && file.written == written;
+    if (!settled) {
+      file = {bytes, written};
+      continue;
+    }
+    if (file.given) continue;
     file.given = true;
     names.push_back(name);
   }

@@ -2,8 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/ground_truth.hpp"
 
+#include <array>
+#include <cstddef>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -23,8 +26,30 @@ std::optional<PlaceRun> parse_run(const std::vector<std::string_view>& cells) {
   const auto query = parse_frame(cells[0]);
   const auto first = parse_frame(cells[1]);
   const auto last = parse_frame(cells.back());
-  if (!query || !first || !last || *first > *last) return std::nullopt;
+  if (!query || !first || !last || *first > *last || *last >= *query) return std::nullopt;
   return PlaceRun{*query, *first, *last};
+}
+
+/// Throws Error where a name stands in another's place.
+void check_names(const std::string& path, const datasets::TextRow& row,
+                 const std::vector<std::string_view>& names) {
+  constexpr std::array<std::pair<std::string_view, std::size_t>, 5> kKnown{
+      {{"query", 0}, {"frame", 0}, {"match", 1}, {"first", 1}, {"last", 2}}};
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    for (const auto& [name, column] : kKnown) {
+      if (names[i] == name && i != column) {
+        datasets::throw_bad_row(path, row, "the names query,first,last or query,match in order");
+      }
+    }
+  }
+}
+
+std::vector<int> thinned(const std::vector<int>& frames, int every) {
+  std::vector<int> kept;
+  for (const int frame : frames) {
+    if (frame % every == 0) kept.push_back(frame / every);
+  }
+  return kept;
 }
 
 std::vector<PlaceRun> thinned(const std::vector<PlaceRun>& runs, int every) {
@@ -48,12 +73,15 @@ std::vector<PlaceRun> read_place_runs(const std::string& path) {
     datasets::split_cells(row.text, cells);
     const bool is_first = columns == 0;
     if (is_first) columns = cells.size();
-    if (is_first && datasets::are_names(cells)) continue;
+    if (is_first && datasets::are_names(cells)) {
+      check_names(path, row, cells);
+      continue;
+    }
     const auto run = parse_run(cells);
     if (!run || cells.size() != columns) {
       datasets::throw_bad_row(path, row,
                               "query,first,last or, in all rows, query,match: frame numbers from "
-                              "0, first <= last");
+                              "0, first <= last < query");
     }
     runs.push_back(*run);
   }
@@ -76,11 +104,10 @@ GroundTruth every_nth(const GroundTruth& truth, int every) {
     throw Error(ErrorKind::option,
                 fmt::format("every is {}, but must be 1 (all frames) or more.", every));
   }
-  GroundTruth kept{thinned(truth.same_place, every), thinned(truth.near_place, every), {}};
-  for (const int query : truth.ignored) {
-    if (query % every == 0) kept.ignored.push_back(query / every);
-  }
-  return kept;
+  return {.same_place = thinned(truth.same_place, every),
+          .near_place = thinned(truth.near_place, every),
+          .ignored = thinned(truth.ignored, every),
+          .unknown = thinned(truth.unknown, every)};
 }
 
 void write_place_runs(const std::string& path, const std::string& comment,

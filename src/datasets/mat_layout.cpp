@@ -49,6 +49,9 @@ using MatrixStart = std::array<std::byte, kMatrixStartBytes>;
 
 /// libmatio takes memory for as many dimensions as a file says, up to 8 GB.
 bool has_sane_dimensions(const MatrixStart& start, bool little) {
+  // Strings, tables and other objects of MATLAB's have none, and are passed over.
+  constexpr std::uint32_t kOpaque = 17;
+  if ((read_number(start.data() + 8, 4, little) & 0xFFU) == kOpaque) return true;
   constexpr std::uint32_t kInt32 = 5;
   constexpr std::uint32_t kMaxDimensions = 32;
   const std::uint32_t type = read_number(start.data() + 16, 4, little);

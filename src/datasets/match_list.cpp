@@ -88,19 +88,30 @@ class Reader {
     }
     const int query = frame(row, cells[columns_.frame ? *columns_.frame : *columns_.query]);
     if (columns_.frame) begin_frame(row, cells, query);
-    if (is_elsewhere(cells[*columns_.match])) return;
+    const std::string_view cell = cells[*columns_.match];
+    const bool is_loop = !columns_.status || cells[*columns_.status] == "loop";
+    if (cell.empty()) return;
+    if (is_elsewhere(cell)) {
+      if (is_loop) list_.elsewhere.push_back(query);
+      return;
+    }
+    const int match = frame(row, cell);
+    if (match >= query) {
+      datasets::throw_bad_row(path_, row,
+                              fmt::format("an earlier frame as the match of {}", query));
+    }
     list_.matches.push_back({.query = query,
-                             .match = frame(row, cells[*columns_.match]),
+                             .match = match,
                              .score = columns_.score ? number(row, cells[*columns_.score]) : 1.0,
-                             .is_loop = !columns_.status || cells[*columns_.status] == "loop"});
+                             .is_loop = is_loop});
   }
 
   MatchList take() { return std::move(list_); }
 
  private:
-  /// No match, or, as loopbit writes it, one in another recording: "session:frame".
+  /// As loopbit writes a match in another recording: "session:frame".
   [[nodiscard]] bool is_elsewhere(std::string_view cell) const {
-    return cell.empty() || (columns_.frame && cell.find(':') != std::string_view::npos);
+    return columns_.frame && cell.find(':') != std::string_view::npos;
   }
 
   void begin_frame(const TextRow& row, const Cells& cells, int frame) {

@@ -110,8 +110,7 @@ class PoseTruth {
   GroundTruth find() {
     for (int query = 0; query < static_cast<int>(poses_.size()); ++query) {
       if (!poses_[static_cast<std::size_t>(query)]) {
-        truth_.ignored.push_back(query);
-        datasets::add_place(unknown_, 0, query);
+        truth_.unknown.push_back(query);
         continue;
       }
       check(pose(query), query);
@@ -145,13 +144,7 @@ class PoseTruth {
     });
     if (options_.grey_radius_m == 0.0) near_.clear();
     add(query, same_, truth_.same_place);
-    const auto begin = static_cast<std::ptrdiff_t>(truth_.near_place.size());
     add(query, near_, truth_.near_place);
-    for (const PlaceRun& run : unknown_) {
-      truth_.near_place.push_back({query, run.first, run.last});
-    }
-    std::sort(truth_.near_place.begin() + begin, truth_.near_place.end(),
-              [](const PlaceRun& a, const PlaceRun& b) { return a.first < b.first; });
   }
 
   static void add(int query, std::vector<int>& places, std::vector<PlaceRun>& runs) {
@@ -164,8 +157,7 @@ class PoseTruth {
   std::vector<double> path_m_;
   Grid grid_;
   GroundTruth truth_;
-  std::vector<PlaceRun> unknown_;  ///< frames so far without a pose; of no query
-  std::vector<int> same_;          ///< of the present query
+  std::vector<int> same_;  ///< of the present query
   std::vector<int> near_;
 };
 

@@ -33,6 +33,10 @@ std::string excerpt(std::string_view text) {
 }
 
 [[noreturn]] void throw_unreadable(const fs::path& file) {
+  if (errno == ENOENT) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' does not exist: correct the path.", file.string()));
+  }
   throw Error(ErrorKind::input, fmt::format("'{}' cannot be read ({}): check its permissions.",
                                             file.string(), std::generic_category().message(errno)));
 }

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/truth_file.hpp"
 
+#include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -89,28 +91,73 @@ TruthMatrix parse_matrix(const std::string& path, const std::vector<TextRow>& ro
   return matrix;
 }
 
-GroundTruth truth_of(const TruthMatrix& matrix, const std::string& path, const Times& times_s) {
-  if (matrix.frames() < times_s.size()) {
-    throw Error(ErrorKind::input,
-                fmt::format("'{}' tells of {} frames, but the sequence has {}: give the ground "
-                            "truth of this sequence, with its number of views a frame.",
-                            path, matrix.frames(), times_s.size()));
-  }
-  return {matrix.runs(), {}, {}};
+/// Throws Error (kind input) where `rows`, one a frame of the whole sequence, end before the last
+/// of the frames read. `things`: what rows are.
+void check_rows(const std::string& path, std::size_t rows, const char* things,
+                std::size_t frames_read, int every) {
+  if (frames_read == 0) return;
+  const std::size_t last = (frames_read - 1) * static_cast<std::size_t>(every);
+  if (last < rows) return;
+  throw Error(ErrorKind::input,
+              fmt::format("'{}' tells of {} {}, but the sequence has {} frames: give what is true "
+                          "of this sequence, and of all its frames where some are left out.",
+                          path, rows, things, last + 1));
 }
 
-GroundTruth read_pose_truth(const std::string& path, const PoseTruthOptions& options,
-                            Times times_s) {
-  const std::vector<CameraPose> poses = read_poses(path);
-  if (!poses.front().timestamp_s) {
-    // The run may have ended early, or its sequence is not known.
-    if (poses.size() > times_s.size()) times_s.resize(poses.size());
-  } else if (times_s.empty()) {
-    throw Error(ErrorKind::input, fmt::format("Trajectory '{}' tells poses by time: give the "
-                                              "sequence as well, with the times of its frames.",
-                                              path));
+/// Of the frames of a matrix with so many views every so-many-th was read.
+int every_of_matrix(const TruthOptions& options) {
+  if (options.every == 1) return 1;
+  if (options.every % options.views == 0) return options.every / options.views;
+  throw Error(ErrorKind::option,
+              fmt::format("Every {}-th image was read, but a frame of the matrix is {} images in "
+                          "turn; read every {}-th, or all.",
+                          options.every, options.views, options.views));
+}
+
+GroundTruth truth_of(const TruthMatrix& matrix, const std::string& path,
+                     const TruthOptions& options, const Times& times_s) {
+  const int every = every_of_matrix(options);
+  check_rows(path, matrix.frames(), "frames", times_s.size(), every);
+  return {.same_place = matrix.runs(), .every = every};
+}
+
+/// In the numbers of the whole sequence what is in those of the frames read.
+GroundTruth in_sequence(GroundTruth truth, int every) {
+  for (auto* runs : {&truth.same_place, &truth.near_place}) {
+    for (PlaceRun& run : *runs) run = {run.query * every, run.first * every, run.last * every};
   }
-  return truth_from_poses(poses_of_frames(poses, times_s), options);
+  for (int& frame : truth.unknown) frame *= every;
+  truth.every = every;
+  return truth;
+}
+
+GroundTruth truth_by_time(const std::vector<CameraPose>& poses, const TruthOptions& options,
+                          const Times& times_s) {
+  PoseTruthOptions of_frames_read = options.poses;
+  of_frames_read.min_gap_frames /= options.every;
+  return in_sequence(truth_from_poses(poses_of_frames(poses, times_s), of_frames_read),
+                     options.every);
+}
+
+GroundTruth read_pose_truth(const std::string& path, const TruthOptions& options,
+                            const Times& times_s) {
+  const std::vector<CameraPose> poses = read_poses(path);
+  const auto has_time = [](const auto& time) { return time.has_value(); };
+  const bool poses_timed = poses.front().timestamp_s.has_value();
+  if (poses_timed && times_s.empty()) {
+    throw Error(ErrorKind::input,
+                fmt::format("Trajectory '{}' tells poses by time: give the sequence as well, with "
+                            "the times of its frames, as a run's folder or a list with the columns "
+                            "frame and timestamp has them.",
+                            path));
+  }
+  if (poses_timed && std::ranges::any_of(times_s, has_time)) {
+    return truth_by_time(poses, options, times_s);
+  }
+  check_rows(path, poses.size(), "poses", times_s.size(), options.every);
+  GroundTruth truth = truth_from_poses({poses.begin(), poses.end()}, options.poses);
+  truth.every = options.every;
+  return truth;
 }
 
 /// The kind of a text file by its first row. Throws if it is none.
@@ -141,20 +188,28 @@ GroundTruth read_truth(const std::string& path, const TruthOptions& options,
     throw Error(ErrorKind::option,
                 fmt::format("views is {}, but must be 1 (a row a frame) or more.", options.views));
   }
+  const auto frames = static_cast<double>(times_s.size()) * options.every;
+  if (options.every < 1 || frames > std::numeric_limits<int>::max()) {
+    throw Error(ErrorKind::option,
+                fmt::format("every is {}, but must be 1 (all frames) or more, and no frame's "
+                            "number over {}.",
+                            options.every, std::numeric_limits<int>::max()));
+  }
   if (is_mat_file(path)) {
-    return truth_of(datasets::read_mat_file(path, options.variable, options.views), path, times_s);
+    return truth_of(datasets::read_mat_file(path, options.variable, options.views), path, options,
+                    times_s);
   }
   if (datasets::is_image_name(path)) {
-    return truth_of(read_mask(path, options.views), path, times_s);
+    return truth_of(read_mask(path, options.views), path, options, times_s);
   }
   const std::vector<TextRow> rows = datasets::read_rows(path);
   switch (text_kind(path, rows)) {
     case TruthKind::runs:
-      return {read_place_runs(path), {}, {}};
+      return {.same_place = read_place_runs(path), .every = options.every};
     case TruthKind::poses:
-      return read_pose_truth(path, options.poses, times_s);
+      return read_pose_truth(path, options, times_s);
     case TruthKind::matrix:
-      return truth_of(parse_matrix(path, rows, options.views), path, times_s);
+      return truth_of(parse_matrix(path, rows, options.views), path, options, times_s);
   }
   return {};
 }

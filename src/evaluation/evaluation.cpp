@@ -50,15 +50,18 @@ std::int64_t count_pairs(std::vector<PlaceRun> runs) {
 class Scorer {
  public:
   Scorer(const MatchList& list, const GroundTruth& truth, const EvaluationOptions& options)
-      : list_(list), judge_(truth, options) {
+      : list_(list),
+        judge_(truth, options),
+        elsewhere_(list.elsewhere.begin(), list.elsewhere.end()) {
     result_.options = options;
-    std::vector<PlaceRun> scored;
     for (const PlaceRun& run : truth.same_place) {
-      if (!is_scored(run.query)) continue;
-      positives_.insert(run.query);
-      scored.push_back(run);
+      const int query = run.query / truth.every;
+      if (run.query % truth.every != 0 || !is_scored(query)) continue;
+      if (judge_.is_positive(query)) positives_.insert(query);
     }
-    result_.pairs.positives = count_pairs(std::move(scored));
+    std::vector<PlaceRun> read = every_nth(truth, truth.every).same_place;
+    std::erase_if(read, [&](const PlaceRun& run) { return !is_scored(run.query); });
+    result_.pairs.positives = count_pairs(std::move(read));
     result_.decision.positives = static_cast<int>(positives_.size());
     result_.decision.ignored = count_ignored(truth);
   }
@@ -71,23 +74,27 @@ class Scorer {
   }
 
  private:
+  [[nodiscard]] bool is_past_end(int query) const {
+    return !list_.times_s.empty() && static_cast<std::size_t>(query) >= list_.times_s.size();
+  }
+
   [[nodiscard]] bool is_scored(int query) const {
-    const bool is_past_end =
-        !list_.times_s.empty() && static_cast<std::size_t>(query) >= list_.times_s.size();
-    return !is_past_end && !judge_.is_ignored(query);
+    return !is_past_end(query) && !judge_.is_ignored(query) && !elsewhere_.contains(query);
   }
 
   /// Frames of the list where it lists them, else queries it speaks of.
   [[nodiscard]] int count_ignored(const GroundTruth& truth) const {
-    std::set<int> ignored;
+    std::set<int> ignored = elsewhere_;
     if (list_.times_s.empty()) {
       for (const ReportedMatch& match : list_.matches) {
         if (judge_.is_ignored(match.query)) ignored.insert(match.query);
       }
     } else {
-      const auto end = static_cast<int>(list_.times_s.size());
-      for (const int query : truth.ignored) {
-        if (query < end) ignored.insert(query);
+      for (const auto* frames : {&truth.ignored, &truth.unknown}) {
+        for (const int frame : *frames) {
+          const int query = frame / truth.every;
+          if (frame % truth.every == 0 && !is_past_end(query)) ignored.insert(query);
+        }
       }
     }
     return static_cast<int>(ignored.size());
@@ -160,6 +167,7 @@ class Scorer {
 
   const MatchList& list_;
   Judge judge_;
+  std::set<int> elsewhere_;
   std::set<int> positives_;
   Evaluation result_;
 };
@@ -168,28 +176,45 @@ class Scorer {
 
 Judge::Judge(const GroundTruth& truth, const EvaluationOptions& options)
     : tolerance_frames_(options.tolerance_frames),
-      ignored_(truth.ignored.begin(), truth.ignored.end()) {
+      every_(truth.every),
+      ignored_(truth.ignored.begin(), truth.ignored.end()),
+      unknown_(truth.unknown.begin(), truth.unknown.end()) {
   for (const PlaceRun& run : truth.same_place) same_place_[run.query].push_back(run);
   for (const PlaceRun& run : truth.near_place) near_place_[run.query].push_back(run);
 }
 
-bool Judge::lists(const RunsByQuery& runs, int query, int match, std::int64_t tolerance) {
-  const auto found = runs.find(query);
-  return found != runs.end() &&
-         std::any_of(found->second.begin(), found->second.end(), [&](const PlaceRun& run) {
-           return match >= run.first - tolerance && match <= run.last + tolerance;
-         });
+template <typename Holds>
+bool Judge::any_run(const RunsByQuery& runs, int query, const Holds& holds) const {
+  const auto found = runs.find(in_sequence(query));
+  return found != runs.end() && std::any_of(found->second.begin(), found->second.end(), holds);
+}
+
+bool Judge::lists(const RunsByQuery& runs, int query, int match, std::int64_t tolerance) const {
+  const std::int64_t place = in_sequence(match);
+  return any_run(runs, query, [&](const PlaceRun& run) {
+    return place >= run.first - tolerance && place <= run.last + tolerance;
+  });
 }
 
 bool Judge::is_true_pair(int query, int match) const { return lists(same_place_, query, match, 0); }
 
 Judgement Judge::judge(int query, int match) const {
   if (lists(same_place_, query, match, tolerance_frames_)) return Judgement::right;
-  return lists(near_place_, query, match, 0) ? Judgement::tolerated : Judgement::wrong;
+  const bool is_near = unknown_.contains(in_sequence(match)) || lists(near_place_, query, match, 0);
+  return is_near ? Judgement::tolerated : Judgement::wrong;
 }
 
 bool Judge::is_positive(int query) const {
-  return same_place_.contains(query) && !is_ignored(query);
+  if (is_ignored(query)) return false;
+  return any_run(same_place_, query, [&](const PlaceRun& run) {
+    const std::int64_t last_read = (std::int64_t{run.last} + tolerance_frames_) / every_ * every_;
+    return last_read >= std::int64_t{run.first} - tolerance_frames_;
+  });
+}
+
+bool Judge::is_ignored(int query) const {
+  const std::int64_t frame = in_sequence(query);
+  return ignored_.contains(frame) || unknown_.contains(frame);
 }
 
 Interval wilson_interval(std::int64_t hits, std::int64_t trials) {

@@ -5,13 +5,16 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <string_view>
+#include <type_traits>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "loopbit/error.hpp"
 #include "loopbit/run_folder.hpp"
@@ -67,6 +70,11 @@ class Row {
     T value{};
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size()) fail(column);
+    if constexpr (std::is_floating_point_v<T>) {
+      if (!std::isfinite(value)) fail(column);
+    } else if constexpr (std::is_signed_v<T>) {
+      if (value < 0) fail(column);
+    }
     return value;
   }
 
@@ -104,7 +112,8 @@ void for_each_row(const std::string& path, std::string_view header, const Visit&
   for (std::size_t line = 1;; ++line) {
     const auto end = rest.find('\n');
     if (end == std::string_view::npos) break;
-    const std::string_view row = rest.substr(0, end);
+    std::string_view row = rest.substr(0, end);
+    if (row.ends_with('\r')) row.remove_suffix(1);
     rest.remove_prefix(end + 1);
     if (line > 1) {
       visit(Row(path, line, row));
@@ -166,6 +175,14 @@ std::vector<std::optional<cv::Vec3d>> read_positions(const std::string& path, st
   return positions;
 }
 
+/// What run.json says of the truth beside it; 1 where it says nothing.
+int truth_every(const std::string& record_json) {
+  const auto record = nlohmann::json::parse(record_json, nullptr, false);
+  if (!record.is_object()) return 1;
+  const auto every = record.find("truth_every");
+  return every != record.end() && every->is_number_integer() ? std::max(1, every->get<int>()) : 1;
+}
+
 }  // namespace
 
 std::vector<Detection> read_detections(const std::string& path) {
@@ -190,9 +207,11 @@ FinishedRun read_run(const std::string& path) {
   run.detections = read_detections((folder / kLoopsFile).string());
   if (is_there(folder / kRecordFile)) run.record_json = read_text(folder / kRecordFile);
   if (is_there(folder / kTruthFile)) {
-    run.truth = GroundTruth{read_place_runs((folder / kTruthFile).string()),
-                            read_place_runs((folder / kNotFalseFile).string()),
-                            read_frame_list((folder / kIgnoreFile).string())};
+    run.truth = {.same_place = read_place_runs((folder / kTruthFile).string()),
+                 .near_place = read_place_runs((folder / kNotFalseFile).string()),
+                 .ignored = read_frame_list((folder / kIgnoreFile).string()),
+                 .unknown = read_frame_list((folder / kUnknownFile).string()),
+                 .every = truth_every(run.record_json)};
   }
   if (is_there(folder / kPositionsFile)) {
     run.positions_m = read_positions((folder / kPositionsFile).string(), run.detections.size());
@@ -206,11 +225,13 @@ MatchList match_list(const std::vector<Detection>& detections) {
   list.times_s.reserve(detections.size());
   for (const Detection& detection : detections) {
     list.times_s.push_back(detection.timestamp_s);
+    const bool is_loop = detection.status == Status::loop;
+    if (detection.earlier_match && is_loop) list.elsewhere.push_back(detection.frame);
     if (!detection.match) continue;
     list.matches.push_back({.query = detection.frame,
                             .match = *detection.match,
                             .score = detection.score,
-                            .is_loop = detection.status == Status::loop});
+                            .is_loop = is_loop});
   }
   return list;
 }

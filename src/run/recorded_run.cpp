@@ -84,7 +84,10 @@ RecordedRun::RecordedRun(RunRecord record, const RunOutput& out)
     : record_(std::move(record)),
       map_(open_map(record_, out.keep_images)),
       detector_(std::in_place, record_.options, map_),
-      folder_(make_folder(record_, out)) {}
+      folder_(make_folder(record_, out)) {
+  record_.stopped_by = kRunning;
+  folder_.write_record(record_);
+}
 
 void RecordedRun::detect(ImageSource& source, const RunListener& listener, bool keep_evidence,
                          const std::atomic<bool>& stop) {
@@ -117,13 +120,15 @@ void RecordedRun::keep_positions(const std::vector<std::optional<cv::Vec3d>>& po
 }
 
 void RecordedRun::score(const GroundTruth& truth, const EvaluationOptions& options) {
-  folder_.write_truth(truth);
   record_.score = evaluate(match_list(folder_.detections()), truth, options);
+  record_.truth_every = truth.every;
+  folder_.write_record(record_);  // the files of the truth are read by it
+  folder_.write_truth(truth);
 }
 
 void RecordedRun::finish(const std::string& stopped_by) {
   record_.stopped_by = stopped_by;
-  folder_.finish(record_);
+  folder_.write_record(record_);
 }
 
 }  // namespace loopbit

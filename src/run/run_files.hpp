@@ -14,6 +14,7 @@ inline constexpr const char* kEvidenceFile = "evidence.db";
 inline constexpr const char* kTruthFile = "truth.csv";
 inline constexpr const char* kNotFalseFile = "not_false.csv";
 inline constexpr const char* kIgnoreFile = "ignore.csv";
+inline constexpr const char* kUnknownFile = "unknown.csv";
 inline constexpr const char* kPositionsFile = "positions.csv";
 inline constexpr const char* kReportFile = "report.html";
 

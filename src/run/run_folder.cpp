@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
@@ -32,8 +33,8 @@ using Json = nlohmann::ordered_json;
 /// All that a run may leave; a run that replaces another may not leave its files beside its own.
 /// Last those that tell a run from a data set, so that a run half removed is still one.
 std::vector<std::string> files_of_a_run() {
-  std::vector<std::string> names{kTruthFile, kNotFalseFile, kIgnoreFile, kPositionsFile,
-                                 kReportFile};
+  std::vector<std::string> names{kTruthFile,   kNotFalseFile,  kIgnoreFile,
+                                 kUnknownFile, kPositionsFile, kReportFile};
   for (const char* suffix : kDatabaseSuffixes) {
     names.push_back(std::string(kEvidenceFile) + suffix);
   }
@@ -146,8 +147,19 @@ Json times(const std::vector<Detection>& detections) {
           {"total", to_json(summarize(detections, total_ms))}};
 }
 
+void add_results(Json& json, const RunRecord& record, const std::vector<Detection>& detections) {
+  json["counts"] = counts(detections);
+  json["times_ms"] = times(detections);
+  json["wall_s"] = record.wall_s;
+  json["frames_per_s"] =
+      record.wall_s > 0 ? static_cast<double>(detections.size()) / record.wall_s : 0.0;
+  json["peak_memory_mib"] = peak_memory_mib();
+  if (record.score) json["score"] = Json::parse(to_json(*record.score, false));
+}
+
 Json to_json(const RunRecord& record, const std::vector<Detection>& detections) {
   Json json{{"loopbit", kVersion},
+            {"arguments", record.arguments},
             {"input",
              {{"path", record.input},
               {"description", record.description},
@@ -156,18 +168,20 @@ Json to_json(const RunRecord& record, const std::vector<Detection>& detections) 
             {"stopped_by", record.stopped_by},
             {"options", Json::parse(loopbit::to_json(record.options))},
             {"machine", machine()},
-            {"threads", record.threads},
-            {"counts", counts(detections)},
-            {"times_ms", times(detections)},
-            {"wall_s", record.wall_s},
-            {"frames_per_s",
-             record.wall_s > 0 ? static_cast<double>(detections.size()) / record.wall_s : 0.0},
-            {"peak_memory_mib", peak_memory_mib()}};
+            {"threads", record.threads}};
   if (!record.map_path.empty()) {
     json["map"] = {{"path", record.map_path}, {"session", record.map_session}};
   }
-  if (record.score) json["score"] = Json::parse(to_json(*record.score, false));
+  if (!record.truth.empty()) json["truth"] = record.truth;
+  if (record.truth_every != 1) json["truth_every"] = record.truth_every;
+  if (record.stopped_by != kRunning) add_results(json, record, detections);
   return json;
+}
+
+std::string frame_list(const char* comment, const std::vector<int>& frames) {
+  std::string text = fmt::format("# {}\n", comment);
+  for (const int frame : frames) text += fmt::format("{}\n", frame);
+  return text;
 }
 
 }  // namespace
@@ -206,9 +220,10 @@ void RunFolder::write_truth(const GroundTruth& truth) {
   write_place_runs((folder / kNotFalseFile).string(),
                    "query, first and last earlier frame: a match here is not false",
                    truth.near_place);
-  std::string ignored = "# queries that are not scored\n";
-  for (const int frame : truth.ignored) ignored += fmt::format("{}\n", frame);
-  write_file((folder / kIgnoreFile).string(), ignored);
+  write_file((folder / kIgnoreFile).string(),
+             frame_list("queries that are not scored", truth.ignored));
+  write_file((folder / kUnknownFile).string(),
+             frame_list("frames of which nobody knows what they show", truth.unknown));
   // Last: where it is, the others are.
   write_place_runs((folder / kTruthFile).string(), "query, first and last true earlier frame",
                    truth.same_place);
@@ -227,7 +242,7 @@ void RunFolder::write_positions(const std::vector<std::optional<cv::Vec3d>>& pos
 std::string RunFolder::evidence_path() const { return (fs::path(path_) / kEvidenceFile).string(); }
 std::string RunFolder::report_path() const { return (fs::path(path_) / kReportFile).string(); }
 
-void RunFolder::finish(const RunRecord& record) {
+void RunFolder::write_record(const RunRecord& record) {
   // A path need not be UTF-8, which JSON is.
   const std::string text =
       to_json(record, detections_).dump(2, ' ', false, Json::error_handler_t::replace);
@@ -249,7 +264,8 @@ TimeSummary summarize(const std::vector<Detection>& detections,
   double sum = 0;
   for (const double time : times) sum += time;
   const auto quantile = [&](double share) {
-    return times[static_cast<std::size_t>(share * static_cast<double>(times.size() - 1))];
+    const double rank = std::ceil(share * static_cast<double>(times.size()));  // from 1
+    return times[static_cast<std::size_t>(rank) - 1];
   };
   return {sum / static_cast<double>(times.size()), quantile(0.5), quantile(0.99), times.back()};
 }

@@ -16,23 +16,29 @@ struct PlaceRun {
   bool operator==(const PlaceRun&) const = default;
 };
 
-/// What is true about a sequence. A query may be in several runs.
+/// What is true about a sequence, in the numbers of its frames. A query may be in several runs.
 struct GroundTruth {
-  std::vector<PlaceRun> same_place;  ///< true earlier places
-  std::vector<PlaceRun> near_place;  ///< a match here is not false, nor right by this alone
-  std::vector<int> ignored;          ///< queries that are not scored
+  std::vector<PlaceRun> same_place = {};  ///< true earlier places
+  std::vector<PlaceRun> near_place = {};  ///< a match here is not false, nor right by this alone
+  std::vector<int> ignored = {};          ///< queries that are not scored
+  /// Frames of which nobody knows what they show: not scored, and no match with them is false.
+  std::vector<int> unknown = {};
+  /// Of the sequence's frames every so-many-th was read: the k-th of them is frame k * every here.
+  int every = 1;
 };
 
-/// Reads rows of `query,first,last` or, all of them, `query,match` (spaces do for commas, too);
-/// blank lines, `#` comments and a first row of names are passed over. Throws Error (kind input)
-/// that names file and line for anything else.
+/// Reads rows of `query,first,last` or, all of them, `query,match` (spaces do for commas, too) with
+/// 0 <= first <= last < query: places are earlier frames. Blank lines, `#` comments and a first row
+/// of names, in this order, are passed over. Throws Error (kind input) that names file and line for
+/// anything else.
 std::vector<PlaceRun> read_place_runs(const std::string& path);
 
 /// Reads the frame that begins each row; what follows a comma is a remark. Errors as above.
 std::vector<int> read_frame_list(const std::string& path);
 
-/// What `truth` says where only every `every`-th frame was read (1 = all), in the numbers of the
-/// frames read. Throws Error (kind option) if `every` is less than 1.
+/// What `truth`, of all frames, says of every `every`-th (1 = all), in the numbers of the frames
+/// read. A place none of whose frames was read is lost; GroundTruth::every loses nothing. Throws
+/// Error (kind option) if `every` is less than 1.
 GroundTruth every_nth(const GroundTruth& truth, int every);
 
 /// Writes rows of `query,first,last` under a line of `comment`. Throws Error (kind output).

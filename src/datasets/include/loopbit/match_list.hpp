@@ -20,8 +20,11 @@ struct ReportedMatch {
 
 /// What a detector says about a sequence.
 struct MatchList {
-  std::vector<ReportedMatch> matches;          ///< in the order of the file
-  std::vector<std::optional<double>> times_s;  ///< one a frame; empty where frames are not listed
+  std::vector<ReportedMatch> matches = {};  ///< in the order of the file
+  /// One a frame; empty where frames are not listed.
+  std::vector<std::optional<double>> times_s = {};
+  /// Queries whose accepted match is a frame of another recording, which truth does not tell of.
+  std::vector<int> elsewhere = {};
 };
 
 /// Reads a CSV file of matches. A first row of names gives the columns their meaning: `query` or
@@ -29,9 +32,9 @@ struct MatchList {
 /// rows with a match are candidates that were rejected) and `timestamp`; other columns are passed
 /// over. Without names rows are `query,match` or `query,match,score`. Where there is no score all
 /// matches have score 1. Rows with an empty match say that the frame has none. `#` begins a
-/// comment. A match `S:F` is frame F of another recording, S: as none, in a file with a column
-/// `frame`. If there is a column `frame`, every frame must have its row, in order, from 0. Throws
-/// Error (kind input) that names file and line.
+/// comment. A match is an earlier frame; one `S:F` is frame F of another recording, S, in a file
+/// with a column `frame`. If there is a column `frame`, every frame must have its row, in order,
+/// from 0. Throws Error (kind input) that names file and line.
 MatchList read_match_list(const std::string& path);
 
 }  // namespace loopbit

@@ -48,7 +48,7 @@ struct PoseTruthOptions {
     using S = PoseTruthOptions;
     return std::tuple{
         Field{"radius_m", &S::radius_m, 0.01, 1000.0, "same place: at most this far apart, m"},
-        Field{"min_gap_frames", &S::min_gap_frames, 1, 1'000'000,
+        Field{"min_gap_frames", &S::min_gap_frames, 0, 1'000'000,
               "same place: more than so many frames apart"},
         Field{"min_path_m", &S::min_path_m, 0.0, 1e6,
               "same place: at least this much driven in between, m"},
@@ -61,10 +61,9 @@ struct PoseTruthOptions {
 
 /// What is true by poses: of each frame, the earlier frames that satisfy `options`; near_place
 /// holds those within the grey radius, whatever their heading, gap or path (and all of same_place).
-/// Frames without a pose are ignored queries, and near_place of each later query: nobody knows what
-/// they show. The path is measured between frames with poses. Throws Error (kind option) for an
-/// option out of range, (kind input) for a position that is not finite or over 1e9 m. Cost: grows
-/// with the pairs within reach, not with the square of the frames.
+/// Frames without a pose are unknown. The path is measured between frames with poses. Throws Error
+/// (kind option) for an option out of range, (kind input) for a position that is not finite or over
+/// 1e9 m. Cost: grows with the pairs within reach, not with the square of the frames.
 GroundTruth truth_from_poses(const std::vector<std::optional<CameraPose>>& poses,
                              const PoseTruthOptions& options = {});
 

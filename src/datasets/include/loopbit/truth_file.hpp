@@ -26,6 +26,7 @@ struct TruthOptions {
   PoseTruthOptions poses;
   std::string variable;  ///< of a .mat file; empty = the only square matrix in it
   int views = 1;         ///< a matrix has so many rows a frame in turn (2: left, right)
+  int every = 1;         ///< of the sequence's frames every so-many-th was read
 };
 
 /// Reads what is true about a sequence, told by what the file is:
@@ -40,9 +41,14 @@ struct TruthOptions {
 /// rows n k to n k + n - 1, and two frames show the same place if any of their views do. At most
 /// 100,000 rows are read.
 ///
-/// `times_s`: the frames' times, one a frame, where the sequence is known; needed for trajectories,
-/// and checked against the number of poses and of rows (0 frames = not known; rows may be more
-/// than frames, of a run that ended early, never fewer).
+/// Truth has the numbers of the whole sequence, and `every` of the options. Where a matrix has n
+/// views and only every n-th image was read (the left ones of pairs in turn), its frames are those
+/// read; other numbers that n does not divide fit no matrix of views.
+///
+/// `times_s`: the times of the frames read, one a frame, where they are known (0 frames = not
+/// known). A trajectory goes by time where any frame has one, and by number, a row a frame of the
+/// whole sequence, where they are known to have none. Rows may be more than frames, of a run that
+/// ended early, never fewer.
 /// Throws Error (kind input) that names file, fault and remedy. A 4541 x 4541 matrix takes well
 /// under a second.
 GroundTruth read_truth(const std::string& path, const TruthOptions& options = {},

@@ -15,7 +15,8 @@
 namespace loopbit {
 
 struct EvaluationOptions {
-  int tolerance_frames = 0;   ///< a match so near to a true earlier place is right, too
+  /// A match so near to a true earlier place is right, too; in frames of the truth's sequence.
+  int tolerance_frames = 0;
   std::string protocol = {};  ///< its name, for the record; empty if it has none
 };
 
@@ -26,7 +27,8 @@ enum class Judgement {
   wrong,      ///< neither
 };
 
-/// Ground truth, made ready to judge many matches. Cost of a question: the runs of its query.
+/// Ground truth, made ready to judge many matches. Queries and matches have the numbers of the
+/// frames read, see GroundTruth::every. Cost of a question: the runs of its query.
 class Judge {
  public:
   explicit Judge(const GroundTruth& truth, const EvaluationOptions& options = {});
@@ -34,20 +36,26 @@ class Judge {
   [[nodiscard]] Judgement judge(int query, int match) const;
   /// Whether truth lists the very frame `match` for `query`, whatever the tolerance.
   [[nodiscard]] bool is_true_pair(int query, int match) const;
-  /// Whether `query` is scored and has a true earlier place: whether it is a revisit.
+  /// Whether `query` is scored and a match of it can be right: whether it is a revisit.
   [[nodiscard]] bool is_positive(int query) const;
-  [[nodiscard]] bool is_ignored(int query) const { return ignored_.contains(query); }
+  [[nodiscard]] bool is_ignored(int query) const;
 
  private:
-  using RunsByQuery = std::unordered_map<int, std::vector<PlaceRun>>;
+  using RunsByQuery = std::unordered_map<std::int64_t, std::vector<PlaceRun>>;
 
-  [[nodiscard]] static bool lists(const RunsByQuery& runs, int query, int match,
-                                  std::int64_t tolerance);
+  /// Calls holds(run) with the runs of `query` until one does.
+  template <typename Holds>
+  [[nodiscard]] bool any_run(const RunsByQuery& runs, int query, const Holds& holds) const;
+  [[nodiscard]] bool lists(const RunsByQuery& runs, int query, int match,
+                           std::int64_t tolerance) const;
+  [[nodiscard]] std::int64_t in_sequence(int frame) const { return std::int64_t{frame} * every_; }
 
   int tolerance_frames_;
+  int every_;
   RunsByQuery same_place_;
   RunsByQuery near_place_;
-  std::unordered_set<int> ignored_;
+  std::unordered_set<std::int64_t> ignored_;
+  std::unordered_set<std::int64_t> unknown_;
 };
 
 /// How far the true share may be from the observed one.
@@ -63,7 +71,7 @@ struct Interval {
 /// What the decisions of a detector come to, query by query. A query's best-scored accepted match
 /// speaks for it (the first of equals).
 struct DecisionCounts {
-  int positives = 0;  ///< queries that are scored and have a true earlier place
+  int positives = 0;  ///< queries that are scored and have a true earlier place that was read
   int right = 0;
   int tolerated = 0;
   int wrong = 0;
@@ -114,7 +122,7 @@ struct Evaluation {
 };
 
 /// Scores `list` against `truth`. Queries past the end of a list that has one (times_s) do not
-/// count. Cost: sorting the matches.
+/// count, nor those answered elsewhere (MatchList::elsewhere). Cost: sorting the matches.
 Evaluation evaluate(const MatchList& list, const GroundTruth& truth,
                     const EvaluationOptions& options = {});
 

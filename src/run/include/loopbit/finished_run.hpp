@@ -18,7 +18,7 @@ namespace loopbit {
 struct FinishedRun {
   std::string path;
   std::vector<Detection> detections;
-  std::string record_json;           ///< run.json; empty if the run did not end in order
+  std::string record_json;           ///< run.json; empty where there is none
   std::optional<GroundTruth> truth;  ///< as it was given to the run
   /// Camera centres, one a frame; empty where the run had no poses.
   std::vector<std::optional<cv::Vec3d>> positions_m;

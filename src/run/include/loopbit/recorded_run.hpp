@@ -49,7 +49,7 @@ class RecordedRun {
   /// Scores what was detected, and keeps what it was scored by.
   void score(const GroundTruth& truth, const EvaluationOptions& options);
 
-  /// Writes run.json. `stopped_by`: see RunRecord. Throws Error (kind output).
+  /// Writes run.json with how it went. `stopped_by`: see RunRecord. Throws Error (kind output).
   void finish(const std::string& stopped_by);
 
   /// What detect() found damaged in the map and left out, a clause a thing.

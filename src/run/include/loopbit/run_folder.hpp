@@ -19,6 +19,9 @@
 
 namespace loopbit {
 
+/// RunRecord::stopped_by of a run that has not ended.
+inline constexpr const char* kRunning = "running";
+
 /// What a run has to say beside its detections; see docs/run_folder.md.
 struct RunRecord {
   std::string input;        ///< as given by the user
@@ -27,15 +30,20 @@ struct RunRecord {
   int every = 1;  ///< of the input's frames, every so-many-th was read
   int limit = 0;  ///< at most so many were read; 0 = all
   int threads = 1;
-  int map_session = 0;             ///< of this run, where there is a map
-  std::string map_path = {};       ///< empty = none
-  std::string stopped_by = "end";  ///< "end", "interrupt", or the sentence of an error
-  double wall_s = 0;               ///< reading and detecting
+  int map_session = 0;        ///< of this run, where there is a map
+  std::string map_path = {};  ///< empty = none
+  /// "running", "end", "interrupt", or the sentence of an error. A run that was killed is running
+  /// for ever.
+  std::string stopped_by = "end";
+  double wall_s = 0;                        ///< reading and detecting
+  std::vector<std::string> arguments = {};  ///< of the command, after its name; empty = a library's
+  std::string truth = {};                   ///< what says what is true, for people
+  int truth_every = 1;                      ///< see GroundTruth::every
   std::optional<Evaluation> score = std::nullopt;
 };
 
 /// A folder that a run leaves its evidence in: loops.csv, a row a frame, complete at any moment;
-/// and run.json, written when the run ends for whatever reason.
+/// and run.json, which tells of the run from its beginning, and how it went when it has ended.
 class RunFolder {
  public:
   /// Makes the folder and begins loops.csv. Throws Error (kind output) if the folder holds an
@@ -48,14 +56,15 @@ class RunFolder {
   void add(const Detection& detection);
 
   /// Writes what is true about the run, so that it can be scored and shown again without the
-  /// files it came from: truth.csv, not_false.csv, ignore.csv. Throws Error (kind output).
+  /// files it came from: truth.csv, not_false.csv, ignore.csv, unknown.csv, in the numbers of the
+  /// whole sequence; RunRecord::truth_every belongs to them. Throws Error (kind output).
   void write_truth(const GroundTruth& truth);
 
   /// Writes positions.csv: camera centres, one a frame. Throws Error (kind output).
   void write_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m);
 
-  /// Writes run.json, all of it or nothing. Throws Error (kind output).
-  void finish(const RunRecord& record);
+  /// Writes run.json anew, all of it or nothing. Throws Error (kind output).
+  void write_record(const RunRecord& record);
 
   [[nodiscard]] const std::vector<Detection>& detections() const { return detections_; }
   [[nodiscard]] const std::string& path() const { return path_; }
