@@ -64,7 +64,7 @@ cv::Mat to_image(ImageArgument& argument, const char* name) {
                                       name, width, height, kMinImageSidePx, kMinImageSidePx));
   }
   if (!has_whole_rows(array)) {
-    array = py::array::ensure(array, py::array::c_style | py::array::forcecast);
+    array = py::module_::import("numpy").attr("ascontiguousarray")(array);
     argument = py::reinterpret_borrow<ImageArgument>(array);
   }
   // cv::Mat has no constructor for memory that is only read; nothing here writes to it.
