@@ -138,11 +138,16 @@ def run_folder(
         if positions_m is not None:
             recorded.keep_positions(numpy.asarray(positions_m, dtype=float))
     except BaseException as error:
-        stopped_by = "interrupt" if isinstance(error, KeyboardInterrupt) else str(error)
+        stopped_by = "interrupt" if isinstance(error, KeyboardInterrupt) else _plain(str(error))
         raise
     finally:
         recorded.finish(stopped_by)
     return _loopbit.read_run(recorded.path)
+
+
+def _plain(text: str) -> str:
+    """Without the bytes of file names that are no text."""
+    return text.encode(errors="backslashreplace").decode()
 
 
 def write_report(run: FinishedRun | Path, path: Path | None = None) -> str:

@@ -7,6 +7,7 @@
 #include "loopbit/error.hpp"
 
 #include "bindings.hpp"
+#include "text.hpp"
 
 namespace loopbit::python {
 namespace {
@@ -65,7 +66,7 @@ void bind_errors(py::module_& module) {
     try {
       if (thrown) std::rethrow_exception(std::move(thrown));
     } catch (const Error& error) {
-      PyErr_SetString(type_of(error.kind()), error.what());
+      PyErr_SetObject(type_of(error.kind()), py::cast(Text{error.what()}).ptr());
     }
   });
 }

@@ -13,6 +13,7 @@
 #include "loopbit/protocol.hpp"
 
 #include "bindings.hpp"
+#include "numpy_columns.hpp"
 #include "numpy_image.hpp"
 #include "settings.hpp"
 
@@ -21,31 +22,34 @@ namespace {
 
 namespace py = pybind11;
 
-template <typename Value>
-using Column = py::array_t<Value, py::array::c_style | py::array::forcecast>;
-
 /// Throws ValueError unless a column has one value a row.
-void check_column(const py::array& column, py::ssize_t rows, const char* name) {
-  if (column.ndim() == 1 && column.shape(0) == rows) return;
-  throw py::value_error(fmt::format("{} has shape {}, but must be ({},), as query has.", name,
-                                    literal(column.attr("shape")), rows));
+void check_rows(std::size_t values, std::size_t rows, const char* name) {
+  if (values == rows) return;
+  throw py::value_error(
+      fmt::format("{} has shape ({},), but must be ({},), as query has.", name, values, rows));
 }
 
-MatchList list_of(const Column<int>& query, const Column<int>& match,
-                  const std::optional<Column<double>>& score,
-                  const std::optional<Column<bool>>& is_loop) {
-  const py::ssize_t rows = query.size();
-  check_column(query, rows, "query");
-  check_column(match, rows, "match");
-  if (score) check_column(*score, rows, "score");
-  if (is_loop) check_column(*is_loop, rows, "is_loop");
+MatchList list_of(const ArrayLike& query, const ArrayLike& match,
+                  const std::optional<ArrayLike>& score, const std::optional<ArrayLike>& is_loop) {
+  const std::vector<int> queries = to_frames(query, "query");
+  const std::size_t rows = queries.size();
+  const std::vector<int> matches = to_frames(match, "match");
+  const auto scores = score ? to_numbers(*score, "score") : std::vector<double>(rows, 1.0);
+  const auto flags = is_loop ? to_flags(*is_loop, "is_loop") : std::vector<bool>(rows, true);
+  check_rows(matches.size(), rows, "match");
+  check_rows(scores.size(), rows, "score");
+  check_rows(flags.size(), rows, "is_loop");
   MatchList list;
-  list.matches.reserve(static_cast<std::size_t>(rows));
-  for (py::ssize_t row = 0; row < rows; ++row) {
-    list.matches.push_back({.query = query.at(row),
-                            .match = match.at(row),
-                            .score = score ? score->at(row) : 1.0,
-                            .is_loop = is_loop ? is_loop->at(row) : true});
+  list.matches.reserve(rows);
+  for (std::size_t row = 0; row < rows; ++row) {
+    if (matches[row] >= queries[row]) {
+      throw py::value_error(fmt::format("match, row {}: {} is not earlier than query {}.", row,
+                                        matches[row], queries[row]));
+    }
+    list.matches.push_back({.query = queries[row],
+                            .match = matches[row],
+                            .score = scores[row],
+                            .is_loop = flags[row]});
   }
   return list;
 }
@@ -55,8 +59,8 @@ void bind_matches(py::module_& module) {
                         "What a detector, any detector, says about a sequence.")
       .def(py::init(&list_of), py::arg("query"), py::arg("match"), py::arg("score") = py::none(),
            py::arg("is_loop") = py::none(),
-           "One value a match: two frames, how sure (1 if not given), and whether the detector "
-           "accepts it (true if not given).")
+           "One value a match: a frame and an earlier one, how sure (1 if not given), and whether "
+           "the detector accepts it (true if not given).")
       .def_property_readonly(
           "matches", [](const MatchList& self) { return take(self.matches); },
           "Structured array of query, match, score and is_loop.")
@@ -70,7 +74,8 @@ void bind_matches(py::module_& module) {
   module.def(
       "read_match_list",
       [](const std::filesystem::path& path) { return read_match_list(path.string()); },
-      py::arg("path"), "Reads a loops.csv, or any CSV of query,match[,score].");
+      py::arg("path"), py::call_guard<py::gil_scoped_release>(),
+      "Reads a loops.csv, or any CSV of query,match[,score].");
 }
 
 template <typename Counts>

@@ -15,6 +15,7 @@
 #include "numpy_image.hpp"
 #include "settings.hpp"
 #include "shared_map.hpp"
+#include "text.hpp"
 
 namespace loopbit::python {
 namespace {
@@ -135,14 +136,15 @@ void bind_session(py::module_& module) {
       .def_readonly("session", &MapSession::session, "From 1; never given twice in a map.")
       .def_readonly("uid", &MapSession::uid,
                     "32 hexadecimal digits, the same in every copy of the session.")
-      .def_readonly("name", &MapSession::name, "What was read, as the user named it.")
+      .def_property_readonly("name", text_of(&MapSession::name),
+                             "What was read, as the user named it.")
       .def_readonly("started", &MapSession::started, "UTC, '2026-11-21T15:04:05Z'.")
       .def_readonly("loopbit", &MapSession::loopbit, "The version that wrote it.")
       .def_readonly("options", &MapSession::options, "Of its detector, as to_json() gives them.")
       .def_readonly("frames", &MapSession::frames, "With the unreadable ones, which are no places.")
       .def("__repr__", [](const MapSession& self) {
         return fmt::format("MapSession({}, {}, started {}, {} frames)", self.session,
-                           literal(py::cast(self.name)), self.started, self.frames);
+                           literal(py::cast(Text{self.name})), self.started, self.frames);
       });
 }
 
@@ -182,7 +184,7 @@ void bind_reader(py::module_& module) {
       .def("check_structure", &call<&MapReader::check_structure, SharedReader>, Free(),
            "What SQLite's integrity_check says of the file; empty if all is well.")
       .def("__repr__", [](const SharedReader& self) {
-        return fmt::format("MapReader({})", literal(py::cast(self.path())));
+        return fmt::format("MapReader({})", literal(py::cast(Text{self.path()})));
       });
 }
 
@@ -193,8 +195,10 @@ void bind_writer(py::module_& module) {
       "writer. Frames are committed in batches of 32 or, at the latest, after a second. In a with "
       "statement, finish() is called at its end.")
       .def(
-          py::init<const std::filesystem::path&, const LoopDetectorOptions&, const std::string&,
-                   bool>(),
+          py::init([](const std::filesystem::path& path, const LoopDetectorOptions& options,
+                      const std::filesystem::path& name, bool keep_images) {
+            return std::make_shared<SharedWriter>(path, options, name.string(), keep_images);
+          }),
           py::arg("path"), py::arg("options"), py::arg("name"), py::arg("keep_images") = false,
           Free(),
           "Creates or continues a map; the name says what the session reads. Raises OutputError if "
@@ -223,7 +227,7 @@ void bind_writer(py::module_& module) {
              const py::object& /*traceback*/) { call<&MapWriter::finish>(self); },
           py::arg("type"), py::arg("error"), py::arg("traceback"), Free())
       .def("__repr__", [](const SharedWriter& self) {
-        return fmt::format("MapWriter({})", literal(py::cast(self.path())));
+        return fmt::format("MapWriter({})", literal(py::cast(Text{self.path()})));
       });
 }
 
@@ -237,7 +241,7 @@ void bind_map(py::module_& module) {
   bind_session(module);
   py::class_<SharedMap, std::shared_ptr<SharedMap>>(
       module, "MapStorage", "What a LoopDetector needs of a map: a MapReader or a MapWriter.")
-      .def_property_readonly("path", &SharedMap::path);
+      .def_property_readonly("path", [](const SharedMap& self) { return Text{self.path()}; });
   bind_reader(module);
   bind_writer(module);
 }

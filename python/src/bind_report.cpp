@@ -14,11 +14,11 @@ namespace {
 
 namespace py = pybind11;
 
-void write_run_report(const FinishedRun& run, const std::string& name,
+void write_run_report(const FinishedRun& run, const std::filesystem::path& name,
                       const std::filesystem::path& path, int tolerance_frames,
                       const std::string& protocol) {
   ReportRun column;
-  column.name = name;
+  column.name = name.string();
   column.list = match_list(run.detections);
   column.run = run;
   column.positions_m = run.positions_m;

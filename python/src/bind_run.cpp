@@ -23,6 +23,7 @@
 #include "bindings.hpp"
 #include "numpy_image.hpp"
 #include "settings.hpp"
+#include "text.hpp"
 
 namespace loopbit::python {
 namespace {
@@ -31,15 +32,15 @@ namespace py = pybind11;
 
 using Path = std::filesystem::path;
 using OnDetection = std::function<void(const Detection&)>;
-using OnBadFrame = std::function<void(const std::string&)>;
+using OnBadFrame = std::function<void(const Text&)>;
 using Positions = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using Free = py::call_guard<py::gil_scoped_release>;
 
-/// What Python is told between two frames: the interpreter's own signals (Ctrl-C raises), then the
-/// callback.
+/// What Python is told between two frames.
 template <typename Callback, typename... Arguments>
 void tell(const Callback& callback, const Arguments&... arguments) {
   const py::gil_scoped_acquire acquire;
-  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  check_signals();
   if (callback) callback(arguments...);
 }
 
@@ -52,7 +53,7 @@ std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector
             detections.push_back(detection);
             tell(on_detection, detection);
           },
-      .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, sentence); }};
+      .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, Text{sentence}); }};
   const std::atomic<bool> never{false};
   {
     const py::gil_scoped_release release;
@@ -74,8 +75,8 @@ RunRecord record_of(const SharedSource& source, const LoopDetectorOptions& optio
 void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_bad_frame,
             bool keep_evidence) {
   const RunListener listener{
-      .on_detection = [](const Detection& detection) { tell(OnDetection{}, detection); },
-      .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, sentence); }};
+      .on_detection = [](const Detection& /*detection*/) { check_signals(); },
+      .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, Text{sentence}); }};
   const std::atomic<bool> never{false};
   const py::gil_scoped_release release;
   recorded.detect(source, listener, keep_evidence, never);
@@ -91,6 +92,7 @@ void keep_positions(RecordedRun& recorded, const Positions& positions_m) {
     const cv::Vec3d position(positions_m.data(row, 0));
     if (!std::isnan(cv::norm(position))) rows[static_cast<std::size_t>(row)] = position;
   }
+  const py::gil_scoped_release release;
   recorded.keep_positions(rows);
 }
 
@@ -104,9 +106,10 @@ void bind_recorded_run(py::module_& module) {
                                                   RunOutput{out.string(), overwrite, keep_images});
            }),
            py::arg("source"), py::arg("out"), py::arg("options"), py::arg("map"),
-           py::arg("overwrite"), py::arg("keep_images"), py::call_guard<py::gil_scoped_release>())
+           py::arg("overwrite"), py::arg("keep_images"), Free())
       .def("detect", &detect, py::arg("source"), py::arg("on_bad_frame"), py::arg("evidence"))
-      .def_property_readonly("path", [](const RecordedRun& self) { return self.folder().path(); })
+      .def_property_readonly("path",
+                             [](const RecordedRun& self) { return Text{self.folder().path()}; })
       .def_property_readonly(
           "times_s",
           [](const RecordedRun& self) { return match_list(self.folder().detections()).times_s; })
@@ -116,9 +119,9 @@ void bind_recorded_run(py::module_& module) {
              const std::string& protocol) {
             self.score(truth, {tolerance_frames, protocol});
           },
-          py::arg("truth"), py::arg("tolerance_frames"), py::arg("protocol"))
+          py::arg("truth"), py::arg("tolerance_frames"), py::arg("protocol"), Free())
       .def("keep_positions", &keep_positions, py::arg("positions_m"))
-      .def("finish", &RecordedRun::finish, py::arg("stopped_by"));
+      .def("finish", &RecordedRun::finish, py::arg("stopped_by"), Free());
 }
 
 std::map<PlaceId, BinaryContent> contents_of(const FinishedRun& run) {
@@ -133,7 +136,7 @@ std::map<PlaceId, BinaryContent> contents_of(const FinishedRun& run) {
 
 void bind_finished_run(py::module_& module) {
   py::class_<FinishedRun>(module, "FinishedRun", "What a run left in its folder.")
-      .def_readonly("path", &FinishedRun::path)
+      .def_property_readonly("path", text_of(&FinishedRun::path))
       .def_readonly("detections", &FinishedRun::detections, "A Detection a frame.")
       .def_readonly("truth", &FinishedRun::truth, "As it was given to the run, or None.")
       .def_readonly("record_json", &FinishedRun::record_json,
@@ -142,13 +145,13 @@ void bind_finished_run(py::module_& module) {
           "positions_m", [](const FinishedRun& self) { return to_array(self.positions_m); },
           "Camera centres, shape (n, 3), nan where not known; n is 0 where the "
           "run had no poses.")
-      .def("contents", &contents_of,
+      .def("contents", &contents_of, Free(),
            "The binary content of each readable frame, by its number; none without evidence.")
       .def("__repr__", [](const FinishedRun& self) {
-        return fmt::format("FinishedRun('{}', {} frames)", self.path, self.detections.size());
+        return Text{fmt::format("FinishedRun('{}', {} frames)", self.path, self.detections.size())};
       });
   module.def(
-      "read_run", [](const Path& path) { return read_run(path.string()); }, py::arg("path"),
+      "read_run", [](const Path& path) { return read_run(path.string()); }, py::arg("path"), Free(),
       "Reads a run folder, also one whose run was cut off.");
 }
 
@@ -156,7 +159,7 @@ void bind_finished_run(py::module_& module) {
 
 void bind_run(py::module_& module) {
   bind_finished_run(module);
-  module.def("match_list", &match_list, py::arg("detections"),
+  module.def("match_list", &match_list, py::arg("detections"), Free(),
              "What detections say, as any detector's list would.");
   module.def("_run", &run_source, py::arg("source"), py::arg("detector"), py::arg("on_detection"),
              py::arg("on_bad_frame"));

@@ -20,6 +20,8 @@ namespace {
 
 namespace py = pybind11;
 
+using Free = py::call_guard<py::gil_scoped_release>;
+
 /// Throws Error unless `world` has that frame.
 void check_frame(const World& world, int frame) {
   if (frame >= 0 && frame < world.options().frames) return;
@@ -35,7 +37,12 @@ void bind_world(py::module_& module) {
                                             "A town, a drive through it, and what is exactly true "
                                             "about that drive. The same options give "
                                             "the same pictures on every machine.")
-      .def(py::init<const WorldOptions&>(), py::arg_v("options", WorldOptions{}, "WorldOptions()"))
+      .def(py::init([](const WorldOptions& options) {
+             const WorldOptions own = options;  // others may change it while the GIL is free
+             const py::gil_scoped_release release;
+             return std::make_shared<World>(own);
+           }),
+           py::arg_v("options", WorldOptions{}, "WorldOptions()"))
       .def_property_readonly("options", [](const World& self) { return self.options(); })
       .def("__len__", [](const World& self) { return self.options().frames; })
       .def(
@@ -61,9 +68,12 @@ void bind_world(py::module_& module) {
       .def(
           "truth",
           [](const World& self) {
-            return GroundTruth{self.same_place(), self.near_place(), {}};
+            GroundTruth truth;
+            truth.same_place = self.same_place();
+            truth.near_place = self.near_place();
+            return truth;
           },
-          "What is true about the drive.")
+          Free(), "What is true about the drive.")
       .def(
           "source",
           [](const std::shared_ptr<World>& self) {
@@ -73,9 +83,9 @@ void bind_world(py::module_& module) {
       .def(
           "write_dataset",
           [](const World& self, const std::filesystem::path& folder) {
-            write_dataset(self, folder.string());
+            write_dataset(self, folder.string(), [](int /*frame*/) { check_signals(); });
           },
-          py::arg("folder"), py::call_guard<py::gil_scoped_release>(),
+          py::arg("folder"), Free(),
           "Writes the drive as a data set: images, times, poses and truth.")
       .def("__repr__", [](const World& self) {
         return fmt::format("World({} frames on a circuit of {:.0f} m)", self.options().frames,

@@ -22,4 +22,11 @@ void bind_world(pybind11::module_& module);
 void bind_run(pybind11::module_& module);
 void bind_report(pybind11::module_& module);
 
+/// What work of many frames calls between two of them, with or without the GIL: throws what the
+/// interpreter's own signals raise, such as KeyboardInterrupt.
+inline void check_signals() {
+  const pybind11::gil_scoped_acquire acquire;
+  if (PyErr_CheckSignals() != 0) throw pybind11::error_already_set();
+}
+
 }  // namespace loopbit::python

@@ -1,0 +1,145 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""Where Python and C++ meet: numbers, names of files, and who may run meanwhile."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import loopbit
+
+NAN, HUGE = float("nan"), 1 << 40
+# A file name that is no UTF-8.
+LATIN = os.fsdecode(b"caf\xe9")
+# Each function reads a pipe that another thread of Python fills: if it kept the GIL, forever.
+READ_PIPES = """
+import os, sys, threading
+import loopbit
+from loopbit import _loopbit
+
+def fill(path, text):
+    with open(path, "w") as file:
+        file.write(text)
+
+for number, (read, text) in enumerate([
+        (loopbit.read_match_list, "5,1"), (loopbit.truth_kind, "5,1"),
+        (_loopbit._read_place_runs, "5,1"), (_loopbit._read_frame_list, "5"),
+        (lambda path: loopbit.read_positions(path, [None]), "1 0 0 0 0 1 0 0 0 0 1 0"),
+        (loopbit.load_options, "{}")]):
+    path = os.path.join(sys.argv[1], str(number))
+    os.mkfifo(path)
+    thread = threading.Thread(target=fill, args=(path, text + "\\n"))
+    thread.start()
+    read(path)
+    thread.join()
+"""
+
+
+def test_an_image_that_cannot_be_copied():
+    limits = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (1 << 36, limits[1]))  # some systems promise anything
+    try:
+        huge = np.broadcast_to(np.zeros(1, np.uint8), (1 << 20, 1 << 20))
+        with pytest.raises(MemoryError):
+            loopbit.LoopDetector().process(huge)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, limits)
+
+
+@pytest.mark.parametrize("columns, kind, words", [
+    (([1.5], [0]), TypeError, "query has dtype float64"),
+    (([2, 3], ["0", "1"]), TypeError, "match has dtype <U1"),
+    (([1], [0], ["high"]), TypeError, "score has dtype <U4"),
+    (([1], [0], [1], [1]), TypeError, "is_loop has dtype int64"),
+    (([3, HUGE], [0, 1]), ValueError, f"query, row 1: {HUGE} is not"),
+    ((np.array([1 << 63], np.uint64), [0]), ValueError, f"query, row 0: {1 << 63} is not"),
+    (([2, 3], [0, -1]), ValueError, "match, row 1: -1 is not"),
+    (([2, 3], [0, 3]), ValueError, "match, row 1: 3 is not earlier than query 3"),
+    (([1, 2], [0, 0], [1, NAN]), ValueError, "score, row 1: nan is not"),
+    (([1], [0], [-np.inf]), ValueError, "score, row 0: -inf is not"),
+    (([[1]], [0]), ValueError, r"query has shape \(1, 1\)"),
+])
+def test_matches_that_are_none(columns, kind, words):
+    with pytest.raises(kind, match=words):
+        loopbit.MatchList(*columns)
+
+
+@pytest.mark.parametrize("lists, kind, words", [
+    (([[5, 1.5]],), TypeError, "same_place has dtype float64"),
+    (([], [[5, "1"]]), TypeError, "near_place has dtype <U"),
+    (([], [], [1.5]), TypeError, "ignored has dtype float64"),
+    (([[5, 1], [6, -1]],), ValueError, "same_place, row 1: -1 is not"),
+    (([[9, 1, 2], [9, 3, HUGE]],), ValueError, f"same_place, row 1: {HUGE} is not"),
+    (([], [[9, 1, 2], [9, 4, 3]]), ValueError, r"near_place, row 1: \(9, 4, 3\) is not first <="),
+    (([[5, 5]],), ValueError, r"same_place, row 0: \(5, 5, 5\) is not first <= last < query"),
+    (([], [], [3, -1]), ValueError, "ignored, row 1: -1 is not"),
+])
+def test_truth_that_is_none(lists, kind, words):
+    with pytest.raises(kind, match=words):
+        loopbit.GroundTruth(*lists)
+
+
+def test_whole_numbers_of_any_type_are_taken():
+    for dtype in (np.int8, np.uint16, np.int64, np.uint64, ">i4"):
+        found = loopbit.MatchList(np.array([7], dtype), np.array([5], dtype), np.array([1], dtype))
+        assert found.matches.tolist() == [(7, 5, 1.0, True)]
+    strided = np.arange(12).reshape(4, 3)[:, ::-1]
+    assert loopbit.GroundTruth(strided[:, [0, 1]]).same_place["query"].tolist() == [2, 5, 8, 11]
+    assert loopbit.GroundTruth(np.zeros((0, 3)), [], ()).same_place.size == 0
+    assert len(loopbit.MatchList([], [], [], [])) == 0
+
+
+def test_names_that_are_no_utf8(dataset, tmp_path):
+    folder = tmp_path / LATIN
+    folder.mkdir()
+    for number in range(2):
+        (folder / f"{LATIN}{number}.png").write_bytes(
+            (dataset / "images" / f"00000{number}.png").read_bytes())
+    (folder / f"{LATIN}9.png").write_bytes(b"no image")
+    frames = list(loopbit.open_source(folder))
+    assert [frame.name for frame in frames] == [f"{LATIN}{n}.png" for n in (0, 1, 9)]
+    assert LATIN in frames[2].error and LATIN in repr(frames[0])
+    with pytest.raises(loopbit.InputError, match=LATIN):
+        loopbit.open_source(tmp_path / f"no {LATIN}")
+
+    bad = []
+    path = tmp_path / f"{LATIN}.db"
+    run = loopbit.run_folder(folder, map=path, on_bad_frame=bad.append)
+    assert len(bad) == 1 and LATIN in bad[0]
+    assert run.path == str(tmp_path / f"{LATIN}_session_1") and LATIN in repr(run)
+    assert loopbit.write_report(run) == f"{run.path}/report.html"
+    map = loopbit.MapReader(path)
+    assert map.path == str(path) and map.sessions[0].name == str(folder)
+    with loopbit.MapWriter(path, map.options, str(folder)) as writer:
+        assert writer.path == str(path)
+
+    def stop(sentence):
+        raise RuntimeError(sentence)
+
+    with pytest.raises(RuntimeError, match=LATIN):
+        loopbit.run_folder(folder, tmp_path / "stopped", on_bad_frame=stop)
+
+
+def test_files_are_read_while_other_threads_run(tmp_path):
+    subprocess.run([sys.executable, "-c", READ_PIPES, tmp_path], check=True, timeout=60)
+
+
+def test_a_data_set_being_written_can_be_stopped(tmp_path):
+    def stop(signum, frame):
+        raise KeyboardInterrupt
+
+    world = loopbit.World(loopbit.WorldOptions(frames=400))  # 10 s
+    before = signal.signal(signal.SIGALRM, stop)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with pytest.raises(KeyboardInterrupt):
+            world.write_dataset(tmp_path)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert len(list((tmp_path / "images").iterdir())) < 100
