@@ -5,11 +5,11 @@ import sys
 
 import loopbit
 
-detector = loopbit.LoopDetector()
-for frame in loopbit.open_source(sys.argv[1]):
-    if frame.image is None:
-        found = detector.skip(frame.timestamp_s)
-    else:
-        found = detector.process(frame.image, frame.timestamp_s)
+
+def show(found):
     if found.is_loop:
         print(f"{found.frame} is {found.match}, score {found.score:g}")
+
+
+# A frame that cannot be used is told, counted, and passed over.
+loopbit.run(sys.argv[1], on_detection=show, on_bad_frame=lambda told: print(told, file=sys.stderr))

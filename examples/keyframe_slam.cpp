@@ -73,8 +73,18 @@ class LoopCloser {
     }
   }
 
+  /// A keyframe that cannot be used is told and counted, so that numbers keep step.
+  loopbit::Detection process(const Keyframe& keyframe) {
+    try {
+      return detector_.process(keyframe.image);
+    } catch (const loopbit::Error& error) {
+      std::cerr << "keyframe " << keyframe.id << ": " << error.what() << '\n';
+      return detector_.skip();
+    }
+  }
+
   void detect(const Keyframe& keyframe) {
-    const loopbit::Detection found = detector_.process(keyframe.image);
+    const loopbit::Detection found = process(keyframe);
     // loopbit numbers places 0, 1, 2, ...; the back end has names of its own for them.
     ids_.push_back(keyframe.id);
     if (found.status == loopbit::Status::loop) {
