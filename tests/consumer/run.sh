@@ -18,13 +18,33 @@ else
   prefix=$scratch/prefix
   cmake --install "$build" --prefix "$prefix" >"$scratch/install.log"
   export PKG_CONFIG_PATH=$prefix/lib/pkgconfig
+  # Where other tests look for the Python module, whatever its version.
+  for folder in "$prefix"/lib/python3.*; do
+    [[ ! -d $folder ]] || ln -s "$(basename "$folder")" "$prefix/lib/python3"
+  done
 fi
 cmake -S "$source" -B "$scratch/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix"
 cmake --build "$scratch/build"
 
-read -ra flags < <(pkg-config --cflags --libs "$([[ -e $prefix/lib/libloopbit.a ]] && echo --static ||
-  echo --shared)" loopbit)
+is_static=
+[[ ! -e $prefix/lib/libloopbit.a ]] || is_static=yes
+read -ra flags < <(pkg-config --cflags --libs "$([[ $is_static ]] && echo --static || echo --shared)" loopbit)
 g++ -std=c++20 "$source/main.cpp" "${flags[@]}" -lopencv_imgcodecs -o "$scratch/by_pkg_config"
+
+# The components that are there, also where matio is not, which only data needs.
+components() {
+  cmake -S "$source/components" -B "$scratch/components" -G Ninja --fresh \
+    -DCMAKE_PREFIX_PATH="$prefix" | tee "$scratch/found"
+}
+components
+for component in loopbit data both; do
+  grep -qxF -e "-- found $component" "$scratch/found"
+done
+if [[ $is_static ]]; then
+  PKG_CONFIG_PATH='' PKG_CONFIG_LIBDIR=$scratch components
+  [[ $(grep -e '-- found' "$scratch/found") == '-- found loopbit' ]]
+  grep -qF -e '-- not both: loopbit::data is not there: pkg-config finds no matio' "$scratch/found"
+fi
 
 if grep -rE -e '-m(avx|sse|arch|tune)' "$prefix"/lib/{,*/}{cmake/loopbit,pkgconfig/loopbit*} 2>/dev/null; then
   echo "run.sh: instruction-set flags reach whoever links loopbit." >&2
