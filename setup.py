@@ -58,8 +58,17 @@ def configure_with_page_if_possible(build):
 def configure(build, *arguments):
     cmake("-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
           "-DLOOPBIT_BUILD_PYTHON=ON", "-DLOOPBIT_BUILD_CLI=OFF", "-DLOOPBIT_BUILD_TESTS=OFF",
-          "-DLOOPBIT_BUILD_BENCHMARKS=OFF", f"-DPython3_EXECUTABLE={sys.executable}", *arguments,
-          *shlex.split(os.environ.get("CMAKE_ARGS", "")))
+          "-DLOOPBIT_BUILD_BENCHMARKS=OFF", f"-DPython3_EXECUTABLE={sys.executable}",
+          *installed_pybind11(), *arguments, *shlex.split(os.environ.get("CMAKE_ARGS", "")))
+
+
+def installed_pybind11():
+    """Where pip put it; CMake looks where the system has it."""
+    try:
+        import pybind11
+    except ImportError:
+        return []
+    return [f"-Dpybind11_DIR={pybind11.get_cmake_dir()}"]
 
 
 def cmake(*arguments):

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Proves that pip installs the package from the source tree, without a network: into a virtual
-# environment that sees what Debian packages. The compiled part comes from BUILD_DIR.
+# Proves that the source archive has what CMake needs, and that pip installs the package from it,
+# without a network: into a virtual environment that sees what Debian packages. The compiled part
+# comes from BUILD_DIR.
 #
 #   pip_test.sh PYTHON BUILD_DIR SCRATCH
 set -euo pipefail
@@ -13,12 +14,23 @@ root=$(dirname "$(dirname "$(dirname "$(readlink -f "$0")")")")
 rm -rf "$scratch"
 mkdir -p "$scratch/tree"
 # A copy, for setuptools writes into the tree that it builds.
-cp -r "$root"/{CMakeLists.txt,README.md,pyproject.toml,setup.py,python} "$scratch/tree"
+cp -r "$root"/{CMakeLists.txt,LICENSE,MANIFEST.in,README.md,pyproject.toml,setup.py,cmake,python,src} \
+  "$scratch/tree"
+version=$(sed -n 's/^  VERSION //p' "$root/CMakeLists.txt")
+(cd "$scratch/tree" && "$python" setup.py --quiet sdist --dist-dir "$scratch")
+archive=$scratch/loopbit-$version.tar.gz
+tar -xf "$archive" -C "$scratch"
+for part in cmake python src; do
+  diff -r --exclude='*.egg-info' --exclude=__pycache__ "$scratch/tree/$part" "$scratch/loopbit-$version/$part"
+done
+cmake -S "$scratch/loopbit-$version" -B "$scratch/configured" -G Ninja --log-level=WARNING \
+  -DLOOPBIT_BUILD_PYTHON=ON -DLOOPBIT_BUILD_REPORT=ON -DLOOPBIT_BUILD_CLI=OFF \
+  -DLOOPBIT_BUILD_TESTS=OFF -DLOOPBIT_BUILD_BENCHMARKS=OFF -DPython3_EXECUTABLE="$python"
+
 "$python" -m venv --system-site-packages "$scratch/venv"
 PIP_NO_INDEX=1 PIP_DISABLE_PIP_VERSION_CHECK=1 LOOPBIT_BUILD_DIR=$build \
-  "$scratch/venv/bin/pip" install --quiet --no-build-isolation "$scratch/tree"
+  "$scratch/venv/bin/pip" install --quiet --no-build-isolation "$archive"
 cd "$scratch"
-version=$(sed -n 's/^  VERSION //p' "$root/CMakeLists.txt")
 "$scratch/venv/bin/python" - "$version" <<'END'
 import importlib.metadata
 import importlib.resources

@@ -63,6 +63,15 @@ def test_a_page_that_cannot_be_built_is_left_out(build):
     assert configured == [["ON"], ["OFF"]] and "npm could not build it" in told
 
 
+def test_the_pybind11_of_pip_is_found(build, tmp_path, monkeypatch):
+    package = tmp_path / "site" / "pybind11"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text(f"def get_cmake_dir(): return {str(package)!r}\n")
+    monkeypatch.setenv("PYTHONPATH", str(package.parent))
+    build()
+    assert f"-Dpybind11_DIR={package}" in (tmp_path / "asked").read_text().split()
+
+
 @pytest.mark.parametrize("wanted", ["ON", "OFF"])
 def test_what_is_asked_for_is_done(build, wanted):
     told, configured = build(page_fails=1, cmake_args=f"-DLOOPBIT_BUILD_REPORT={wanted}")
