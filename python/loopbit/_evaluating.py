@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from typing import Union
+from typing import Any, Union
 
 from loopbit import _loopbit
 from loopbit._loopbit import (
@@ -33,14 +33,17 @@ def read_truth(
     views: int | None = None,
     not_false: Path | None = None,
     ignore: Path | None = None,
+    every: int = 1,
     times_s: Times = (),
 ) -> GroundTruth:
     """What is true about a sequence, by a file: rows of query,first,last or query,match; KITTI
     poses or a TUM trajectory, which needs the frames' times; a loop matrix as .mat, text or image.
 
     A protocol fixes poses and views, which then must not be given. not_false and ignore are files
-    of matches that are not wrong, and of queries that are not scored.
+    of matches that are not wrong, and of queries that are not scored. All files count the frames of
+    the whole sequence, of which every so-many-th was read, at times_s.
     """
+    kind = _loopbit.truth_kind(path)
     settings = PoseTruthOptions() if poses is None else poses
     rows = 1 if views is None else views
     if protocol:
@@ -50,23 +53,48 @@ def read_truth(
                 f"poses and views cannot be given with protocol '{protocol}', which fixes them; "
                 "leave out one of them."
             )
-        kind = _loopbit.truth_kind(path)
-        if named.truth_kind != kind:
-            raise _loopbit.OptionError(
-                f"protocol '{protocol}' is defined on {_words(named.truth_kind)}, but '{path}' "
-                f"is {_words(kind)}; name another file, or leave out the protocol."
-            )
+        check_kind(protocol, path)
         settings, rows = named.poses, named.views
-    truth = _loopbit._read_truth(path, settings, variable, rows, list(times_s))
+    for name, given, needed in (
+        ("poses", poses is not None, TruthKind.poses),
+        ("views", rows != 1, TruthKind.matrix),
+        ("variable", variable != "", TruthKind.matrix),
+    ):
+        if given and kind != needed:
+            raise _loopbit.OptionError(
+                f"{name} is about {_words(needed)}, but '{path}' is {_words(kind)}; leave it out, "
+                "or name another file."
+            )
+    truth = _loopbit._read_truth(path, settings, variable, rows, every, list(times_s))
     if not_false is None and ignore is None:
         return truth
-    near = [tuple(run) for run in truth.near_place.tolist()]
+    near = truth.near_place.tolist()
     if not_false is not None:
         near += _loopbit._read_place_runs(not_false).tolist()
     ignored = truth.ignored.tolist()
     if ignore is not None:
         ignored += _loopbit._read_frame_list(ignore)
-    return GroundTruth(truth.same_place.tolist(), near, ignored)
+    return GroundTruth(truth.same_place.tolist(), near, ignored, truth.unknown, truth.every)
+
+
+def check_kind(protocol: str, path: Path) -> None:
+    """Raises OptionError unless the protocol is defined on what the file is."""
+    named, kind = _loopbit.find_protocol(protocol), _loopbit.truth_kind(path)
+    if named.truth_kind != kind:
+        raise _loopbit.OptionError(
+            f"protocol '{protocol}' is defined on {_words(named.truth_kind)}, but '{path}' "
+            f"is {_words(kind)}; name another file, or leave out the protocol."
+        )
+
+
+def check_value(protocol: str) -> None:
+    """Raises OptionError if there is a protocol, for truth that does not say what it is by."""
+    if protocol:
+        kind = _loopbit.find_protocol(protocol).truth_kind
+        raise _loopbit.OptionError(
+            f"protocol '{protocol}' is defined on {_words(kind)}, and this truth does not say that "
+            "it is by those; give truth as the path of a file, or leave out the protocol."
+        )
 
 
 def _words(kind: TruthKind) -> str:
@@ -87,9 +115,9 @@ def evaluate(
     """Scores what a detector, any detector, found.
 
     found: a run, a list of matches, detections, or the path of a run folder or of a CSV of
-    query,match[,score]. truth: as read_truth() gives it, or its path; a run that was given a truth
-    needs none, and is scored as it was then. A protocol fixes the tolerance, which then must not be
-    given.
+    query,match[,score]. truth: as read_truth() gives it, for the frames that were read, or its
+    path; a run that was given a truth needs none, and is scored as it was then. A protocol fixes
+    the tolerance, which then must not be given, and needs the truth's path.
     """
     if isinstance(found, (str, os.PathLike)) and os.path.isdir(found):
         found = _loopbit.read_run(found)
@@ -102,23 +130,46 @@ def evaluate(
     if protocol:
         tolerance = _loopbit.find_protocol(protocol).tolerance_frames
     if isinstance(found, FinishedRun) and truth is None:
-        truth = found.truth
-        if not protocol and tolerance_frames is None:
-            tolerance, protocol = recorded_scoring(found)
+        truth, recorded = found.truth, recorded_scoring(found)
+        if truth is not None and protocol != recorded[1]:
+            check_value(protocol)
+        if tolerance_frames is None:
+            tolerance, protocol = recorded
+    elif isinstance(truth, GroundTruth):
+        check_value(protocol)
     if truth is None:
         raise _loopbit.OptionError("Nothing says what is true; give truth.")
     if tolerance < 0:
         raise _loopbit.OptionError(f"tolerance_frames is {tolerance}, but must be 0 or more.")
     matches = _matches(found)
     if not isinstance(truth, GroundTruth):
-        truth = read_truth(truth, protocol=protocol, times_s=matches.times_s)
+        every = _every(found) if isinstance(found, FinishedRun) else 1
+        truth = read_truth(truth, protocol=protocol, every=every, times_s=matches.times_s)
     return _loopbit._evaluate(matches, truth, tolerance, protocol)
 
 
 def recorded_scoring(run: FinishedRun) -> tuple[int, str]:
     """The tolerance and the protocol that the run was scored with when it ended."""
-    score = json.loads(run.record_json or "{}").get("score", {})
+    score = _record(run).get("score", {})
     return score.get("tolerance_frames", 0), score.get("protocol") or ""
+
+
+def _every(run: FinishedRun) -> int:
+    every: int = _record(run).get("input", {}).get("every", 1)
+    return every
+
+
+def _record(run: FinishedRun) -> dict[str, Any]:
+    try:
+        record: Any = json.loads(run.record_json or "{}")
+    except ValueError:
+        record = None
+    if not isinstance(record, dict):
+        raise _loopbit.InputError(
+            f"The run.json in '{run.path}' is no record of a run: it was changed after loopbit "
+            "wrote it; run again."
+        )
+    return record
 
 
 def _matches(found: FinishedRun | MatchList | Sequence[Detection] | Path) -> MatchList:

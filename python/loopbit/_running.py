@@ -13,7 +13,7 @@ import numpy
 import numpy.typing
 
 from loopbit import _loopbit
-from loopbit._evaluating import Path, read_truth, recorded_scoring
+from loopbit._evaluating import Path, check_kind, check_value, read_truth, recorded_scoring
 from loopbit._loopbit import (
     Detection,
     FinishedRun,
@@ -21,6 +21,7 @@ from loopbit._loopbit import (
     ImageSource,
     LoopDetector,
     LoopDetectorOptions,
+    TruthKind,
 )
 
 _DETECTION = numpy.dtype(
@@ -106,43 +107,94 @@ def run_folder(
     run.json, with evidence also what the frames looked like, for write_report().
 
     map: a map to continue with a session, made if there is none; places of earlier sessions are
-    recognised, too; keep_images: with a small JPEG of each place. Without out, the folder is beside it: town_session_2 for session 2 of town.db.
-    truth: as read_truth() gives it, in the numbers of the frames read, or its path, where all
-    frames are read. positions_m: camera centres, one a frame, nan where not known, or a file of
-    poses; a truth by poses gives them, too.
+    recognised, too; keep_images: with a small JPEG of each place. Without out, the folder is beside
+    it: town_session_2 for session 2 of town.db. truth: a file's path, or as read_truth() gives it
+    for the frames that are read. positions_m: camera centres, one a frame read, nan where not
+    known, or a file of poses; a truth by poses gives them, too. Files count all frames of the
+    sequence, whatever part of it is read. A protocol needs the truth's path.
+
+    What is wrong with an argument is told before the first frame, where it can be. What turns out
+    to be wrong with truth or positions when the run has ended leaves it without them.
     """
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)
-    if source.every > 1 and any(isinstance(x, (str, os.PathLike)) for x in (truth, positions_m)):
-        raise _loopbit.OptionError(
-            f"Every {source.every}-th frame is read, but files count all of them; give truth as "
-            "every_nth(read_truth(FILE), N), and positions_m as an array."
-        )
-    if isinstance(truth, (str, os.PathLike)) and positions_m is None:
-        if _loopbit.truth_kind(truth) == _loopbit.TruthKind.poses:
-            positions_m = truth
+    every, frames = source.every, _loopbit._frames_left(source)
+    if keep_images and not map:
+        raise _loopbit.OptionError("keep_images keeps them in a map; give map, or leave it out.")
+    if not callable(on_bad_frame):
+        raise TypeError(f"on_bad_frame is {on_bad_frame!r}, but must be callable.")
+    _check_truth(truth, protocol, every, frames)
     tolerance = _loopbit.find_protocol(protocol).tolerance_frames if protocol else 0
-    options = LoopDetectorOptions() if options is None else options
+    if positions_m is None and isinstance(truth, (str, os.PathLike)):
+        if _loopbit.truth_kind(truth) == TruthKind.poses:
+            positions_m = truth
+    if isinstance(positions_m, (str, os.PathLike)):
+        _loopbit._check_poses(positions_m, frames, every)
+    elif positions_m is not None:
+        positions_m = numpy.asarray(positions_m, dtype=float)
+        _check_positions(positions_m, frames)
     recorded = _loopbit._RecordedRun(
-        source, out or "", options, map or "", overwrite, keep_images
+        source,
+        out or "",
+        LoopDetectorOptions() if options is None else options,
+        map or "",
+        overwrite,
+        keep_images,
+        truth if isinstance(truth, (str, os.PathLike)) else "",
+        positions_m if isinstance(positions_m, (str, os.PathLike)) else "",
     )
     stopped_by = "end"
     try:
-        recorded.detect(source, on_bad_frame, evidence)
-        if isinstance(truth, (str, os.PathLike)):
-            truth = read_truth(truth, protocol=protocol, times_s=recorded.times_s)
-        if truth is not None:
-            recorded.score(truth, tolerance, protocol)
-        if isinstance(positions_m, (str, os.PathLike)):
-            positions_m = _loopbit.read_positions(positions_m, recorded.times_s)
-        if positions_m is not None:
-            recorded.keep_positions(numpy.asarray(positions_m, dtype=float))
+        recorded.detect(source, on_bad_frame, bool(evidence))
     except BaseException as error:
         stopped_by = "interrupt" if isinstance(error, KeyboardInterrupt) else _plain(str(error))
         raise
+    else:
+        times_s = recorded.times_s
+        try:
+            if isinstance(truth, (str, os.PathLike)):
+                truth = read_truth(truth, protocol=protocol, every=every, times_s=times_s)
+            if truth is not None:
+                recorded.score(truth, tolerance, protocol)
+        finally:
+            if isinstance(positions_m, (str, os.PathLike)):
+                positions_m = _loopbit.read_positions(positions_m, times_s, every)
+            if positions_m is not None:
+                _check_positions(positions_m, len(times_s))
+                recorded.keep_positions(positions_m)
     finally:
         recorded.finish(stopped_by)
     return _loopbit.read_run(recorded.path)
+
+
+def _check_truth(
+    truth: GroundTruth | Path | None, protocol: str, every: int, frames: int | None
+) -> None:
+    """Raises what reading truth will, as far as can be told before the frames are read."""
+    if truth is None:
+        if protocol:
+            raise _loopbit.OptionError(
+                f"protocol '{protocol}' is about truth; give truth, or leave out the protocol."
+            )
+    elif isinstance(truth, GroundTruth):
+        check_value(protocol)
+    elif not isinstance(truth, (str, os.PathLike)):
+        raise TypeError(f"truth is {truth!r}, but must be a GroundTruth or a path.")
+    elif _loopbit.truth_kind(truth) == TruthKind.poses:
+        if protocol:
+            check_kind(protocol, truth)
+        _loopbit._check_poses(truth, frames, every)
+    else:
+        read_truth(truth, protocol=protocol, every=every, times_s=[None] * (frames or 0))
+
+
+def _check_positions(positions_m: numpy.typing.NDArray[Any], frames: int | None) -> None:
+    if positions_m.ndim != 2 or positions_m.shape[1] != 3:
+        raise ValueError(f"positions_m has shape {positions_m.shape}, but must be (n, 3).")
+    if frames is not None and len(positions_m) != frames:
+        raise ValueError(f"positions_m has {len(positions_m)} rows, but there are {frames} frames.")
+    if numpy.isinf(positions_m).any():
+        raise ValueError("positions_m is infinite somewhere, but must be nan where not known.")
 
 
 def _plain(text: str) -> str:

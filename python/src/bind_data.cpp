@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "bind_data.hpp"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -27,6 +28,7 @@ namespace py = pybind11;
 
 using Path = std::filesystem::path;
 using Times = std::vector<std::optional<double>>;
+using Positions = std::vector<std::optional<cv::Vec3d>>;
 using Free = py::call_guard<py::gil_scoped_release>;
 
 std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit) {
@@ -86,6 +88,7 @@ void bind_source(py::module_& module) {
              "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
              "folder, a text file that lists images, an image, a video, or 'camera:N'. Every so "
              "many-th frame is read, at most so many (0: all).");
+  module.def("_frames_left", &SharedSource::frames_left, py::arg("source"), Free());
 }
 
 std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {
@@ -110,20 +113,29 @@ std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {
   return runs;
 }
 
+int checked_every(int every) {
+  if (every >= 1) return every;
+  throw Error(ErrorKind::option,
+              fmt::format("every is {}, but must be 1 (all frames) or more.", every));
+}
+
 void bind_truth(py::module_& module) {
   py::class_<GroundTruth>(module, "GroundTruth",
-                          "What is true about a sequence: structured arrays of query, first and "
-                          "last, int32; the frames first to last show what frame query shows.")
+                          "What is true about a sequence, in the numbers of all its frames: "
+                          "structured arrays of query, first and last, int32; the frames first to "
+                          "last show what frame query shows.")
       .def(py::init([](const ArrayLike& same_place, const ArrayLike& near_place,
-                       const ArrayLike& ignored) {
+                       const ArrayLike& ignored, const ArrayLike& unknown, int every) {
              GroundTruth truth;
              truth.same_place = to_runs(same_place, "same_place");
              truth.near_place = to_runs(near_place, "near_place");
              truth.ignored = to_frames(ignored, "ignored");
+             truth.unknown = to_frames(unknown, "unknown");
+             truth.every = checked_every(every);
              return truth;
            }),
            py::arg("same_place"), py::arg("near_place") = py::tuple(),
-           py::arg("ignored") = py::tuple(),
+           py::arg("ignored") = py::tuple(), py::arg("unknown") = py::tuple(), py::arg("every") = 1,
            "From integers of shape (n, 2): query, match; or (n, 3): query, first, last; places are "
            "earlier frames.")
       .def_property_readonly(
@@ -135,9 +147,18 @@ void bind_truth(py::module_& module) {
       .def_property_readonly(
           "ignored", [](const GroundTruth& self) -> py::array_t<int> { return take(self.ignored); },
           "Queries that are not scored.")
+      .def_property_readonly(
+          "unknown", [](const GroundTruth& self) -> py::array_t<int> { return take(self.unknown); },
+          "Frames of which nobody knows what they show: not scored as queries, and no match with "
+          "them is false.")
+      .def_readonly("every", &GroundTruth::every,
+                    "Of the sequence's frames every so-many-th was read: the k-th of them is frame "
+                    "k * every here.")
       .def("__repr__", [](const GroundTruth& self) {
-        return fmt::format("GroundTruth(same_place={} rows, near_place={} rows, ignored={})",
-                           self.same_place.size(), self.near_place.size(), self.ignored.size());
+        return fmt::format(
+            "GroundTruth(same_place={} rows, near_place={} rows, ignored={}, unknown={}, every={})",
+            self.same_place.size(), self.near_place.size(), self.ignored.size(),
+            self.unknown.size(), self.every);
       });
   py::enum_<TruthKind>(module, "TruthKind", "What a file says places are the same by.")
       .value("runs", TruthKind::runs, "rows of query,first,last or query,match")
@@ -145,20 +166,53 @@ void bind_truth(py::module_& module) {
       .value("poses", TruthKind::poses, "where the camera stood");
 }
 
+bool has_times(const std::vector<CameraPose>& poses) {
+  return poses.front().timestamp_s.has_value();
+}
+
+/// The rows of the frames read, where row and frame go together by number. Throws Error (kind
+/// input) if they are too few.
+Positions rows_read(const std::vector<CameraPose>& poses, const std::string& path,
+                    std::size_t frames, std::size_t every) {
+  if (frames > 0 && (frames - 1) * every >= poses.size()) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' has {} poses, but the sequence has {} frames: give a pose for "
+                            "each, or leave it out.",
+                            path, poses.size(), (frames - 1) * every + 1));
+  }
+  Positions positions_m;
+  for (std::size_t row = 0; positions_m.size() < frames; row += every) {
+    positions_m.emplace_back(poses[row].position_m);
+  }
+  return positions_m;
+}
+
 /// To be called with the GIL, which is free meanwhile.
-std::vector<std::optional<cv::Vec3d>> positions_of_frames(const std::string& path,
-                                                          const Times& times_s) {
+Positions positions_of_frames(const std::string& path, const Times& times_s, int every) {
+  const auto step = static_cast<std::size_t>(checked_every(every));
   const py::gil_scoped_release release;
-  const auto poses = poses_of_frames(read_poses(path), times_s);
-  std::vector<std::optional<cv::Vec3d>> positions_m;
-  positions_m.reserve(poses.size());
-  for (const auto& pose : poses) {
+  const std::vector<CameraPose> poses = read_poses(path);
+  const bool frames_have_times = std::any_of(times_s.begin(), times_s.end(),
+                                             [](const auto& time) { return time.has_value(); });
+  if (!has_times(poses) || !frames_have_times) {
+    return rows_read(poses, path, times_s.size(), step);
+  }
+  Positions positions_m;
+  positions_m.reserve(times_s.size());
+  for (const auto& pose : poses_of_frames(poses, times_s)) {
     positions_m.push_back(pose ? std::optional(pose->position_m) : std::nullopt);
   }
   return positions_m;
 }
 
-/// As above.
+/// Throws what the above would, as far as can be told before the frames are known.
+void check_poses(const Path& path, std::optional<std::size_t> frames, int every) {
+  const std::vector<CameraPose> poses = read_poses(path.string());
+  if (!frames || has_times(poses)) return;
+  (void)rows_read(poses, path.string(), *frames, static_cast<std::size_t>(every));
+}
+
+/// As positions_of_frames().
 std::vector<PlaceRun> place_runs_of(const std::string& path) {
   const py::gil_scoped_release release;
   return read_place_runs(path);
@@ -169,12 +223,16 @@ void bind_poses(py::module_& module) {
                                   "When two frames with known poses show the same place.");
   module.def(
       "read_positions",
-      [](const Path& path, const Times& times_s) {
-        return to_array(positions_of_frames(path.string(), times_s));
+      [](const Path& path, const Times& times_s, int every) {
+        return to_array(positions_of_frames(path.string(), times_s, every));
       },
-      py::arg("path"), py::arg("times_s"),
-      "Camera centres by KITTI poses or a TUM trajectory, shape (n, 3), nan where not known; one a "
-      "time, None where a frame has none.");
+      py::arg("path"), py::arg("times_s"), py::arg("every") = 1,
+      "Camera centres by KITTI poses or a TUM trajectory, shape (n, 3), nan where not known: one "
+      "for "
+      "each time, None where a frame has none. Of the sequence's frames every so-many-th was read, "
+      "at these times.");
+  module.def("_check_poses", &check_poses, py::arg("path"), py::arg("frames"), py::arg("every"),
+             Free());
 }
 
 }  // namespace
@@ -190,11 +248,11 @@ void bind_data(py::module_& module) {
   module.def(
       "_read_truth",
       [](const Path& path, const PoseTruthOptions& poses, const std::string& variable, int views,
-         const Times& times_s) {
-        return read_truth(path.string(), {poses, variable, views}, times_s);
+         int every, const Times& times_s) {
+        return read_truth(path.string(), {poses, variable, views, every}, times_s);
       },
-      py::arg("path"), py::arg("poses"), py::arg("variable"), py::arg("views"), py::arg("times_s"),
-      Free());
+      py::arg("path"), py::arg("poses"), py::arg("variable"), py::arg("views"), py::arg("every"),
+      py::arg("times_s"), Free());
   module.def(
       "_read_place_runs", [](const Path& path) { return take(place_runs_of(path.string())); },
       py::arg("path"));

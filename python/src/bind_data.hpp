@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "loopbit/image_source.hpp"
@@ -23,11 +25,20 @@ class SharedSource : public ImageSource {
   // These must be called without the GIL: see SharedDetector.
   bool next(Frame& frame) override {
     const std::scoped_lock lock(mutex_);
-    return source_->next(frame);
+    return counted(source_->next(frame));
   }
   bool skip() override {
     const std::scoped_lock lock(mutex_);
-    return source_->skip();
+    return counted(source_->skip());
+  }
+
+  /// How many frames are still to come, where that is sure: a video says about how many.
+  [[nodiscard]] std::optional<std::size_t> frames_left() {
+    const std::scoped_lock lock(mutex_);
+    std::error_code error;
+    const auto frames = source_->size();
+    if (!frames || !std::filesystem::is_directory(input_, error)) return std::nullopt;
+    return *frames - taken_;
   }
 
   [[nodiscard]] std::optional<std::size_t> size() const override { return source_->size(); }
@@ -37,10 +48,16 @@ class SharedSource : public ImageSource {
   [[nodiscard]] int limit() const { return limit_; }
 
  private:
+  bool counted(bool is_there) {
+    if (is_there) ++taken_;
+    return is_there;
+  }
+
   std::string input_;
   int every_;
   int limit_;
   std::mutex mutex_;
+  std::size_t taken_ = 0;
   std::unique_ptr<ImageSource> source_;
 };
 

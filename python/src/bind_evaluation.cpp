@@ -67,6 +67,10 @@ void bind_matches(py::module_& module) {
       .def_property_readonly(
           "times_s", [](const MatchList& self) { return self.times_s; },
           "Seconds or None, one a frame; empty where frames are not listed.")
+      .def_property_readonly(
+          "elsewhere",
+          [](const MatchList& self) -> py::array_t<int> { return take(self.elsewhere); },
+          "Queries whose accepted match is in another recording, and which are not scored.")
       .def("__len__", [](const MatchList& self) { return self.matches.size(); })
       .def("__repr__", [](const MatchList& self) {
         return fmt::format("MatchList({} matches)", self.matches.size());

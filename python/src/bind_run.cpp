@@ -63,13 +63,14 @@ std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector
 }
 
 RunRecord record_of(const SharedSource& source, const LoopDetectorOptions& options,
-                    const std::string& map) {
+                    const std::string& map, const std::string& truth) {
   return {.input = source.input(),
           .description = source.description(),
           .options = options,
           .every = source.every(),
           .limit = source.limit(),
-          .map_path = map};
+          .map_path = map,
+          .truth = truth};
 }
 
 void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_bad_frame,
@@ -83,13 +84,10 @@ void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_ba
 }
 
 void keep_positions(RecordedRun& recorded, const Positions& positions_m) {
-  if (positions_m.ndim() != 2 || positions_m.shape(1) != 3) {
-    throw py::value_error(fmt::format("positions_m has shape {}, but must be (n, 3).",
-                                      literal(positions_m.attr("shape"))));
-  }
   std::vector<std::optional<cv::Vec3d>> rows(static_cast<std::size_t>(positions_m.shape(0)));
   for (py::ssize_t row = 0; row < positions_m.shape(0); ++row) {
-    const cv::Vec3d position(positions_m.data(row, 0));
+    const cv::Vec3d position(positions_m.at(row, 0), positions_m.at(row, 1),
+                             positions_m.at(row, 2));
     if (!std::isnan(cv::norm(position))) rows[static_cast<std::size_t>(row)] = position;
   }
   const py::gil_scoped_release release;
@@ -101,12 +99,16 @@ void bind_recorded_run(py::module_& module) {
   py::class_<RecordedRun>(module, "_RecordedRun")
       .def(py::init([](const SharedSource& source, const Path& out,
                        const LoopDetectorOptions& options, const Path& map, bool overwrite,
-                       bool keep_images) {
-             return std::make_unique<RecordedRun>(record_of(source, options, map.string()),
-                                                  RunOutput{out.string(), overwrite, keep_images});
+                       bool keep_images, const Path& truth, const Path& poses) {
+             return std::make_unique<RecordedRun>(
+                 record_of(source, options, map.string(), truth.string()),
+                 RunOutput{.folder = out.string(),
+                           .overwrite = overwrite,
+                           .keep_images = keep_images,
+                           .inputs = {source.input(), truth.string(), poses.string()}});
            }),
            py::arg("source"), py::arg("out"), py::arg("options"), py::arg("map"),
-           py::arg("overwrite"), py::arg("keep_images"), Free())
+           py::arg("overwrite"), py::arg("keep_images"), py::arg("truth"), py::arg("poses"), Free())
       .def("detect", &detect, py::arg("source"), py::arg("on_bad_frame"), py::arg("evidence"))
       .def_property_readonly("path",
                              [](const RecordedRun& self) { return Text{self.folder().path()}; })
@@ -139,8 +141,9 @@ void bind_finished_run(py::module_& module) {
       .def_property_readonly("path", text_of(&FinishedRun::path))
       .def_readonly("detections", &FinishedRun::detections, "A Detection a frame.")
       .def_readonly("truth", &FinishedRun::truth, "As it was given to the run, or None.")
-      .def_readonly("record_json", &FinishedRun::record_json,
-                    "run.json; empty if the run did not end in order.")
+      .def_readonly(
+          "record_json", &FinishedRun::record_json,
+          "run.json; empty where there is none. Its stopped_by is 'running' until the run ends.")
       .def_property_readonly(
           "positions_m", [](const FinishedRun& self) { return to_array(self.positions_m); },
           "Camera centres, shape (n, 3), nan where not known; n is 0 where the "

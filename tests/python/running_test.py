@@ -81,14 +81,102 @@ def test_a_run_that_is_stopped_keeps_what_it_found(tmp_path, dataset, error, sto
     loopbit.run_folder(folder, tmp_path / "run", overwrite=True, on_bad_frame=lambda _: None)
 
 
-def test_every_nth_frame(dataset, world, tmp_path):
+@pytest.mark.parametrize("every", [2, 3])
+@pytest.mark.parametrize("file, flags, arguments", [
+    ("truth.csv", [], {}), ("poses.txt", ["--protocol", "kitti"], {"protocol": "kitti"})])
+def test_every_nth_frame(command, dataset, tmp_path, every, file, flags, arguments):
+    truth = dataset / file
+    theirs, ours = tmp_path / "cpp", tmp_path / "python"
+    command("run", dataset / "images", "--out", theirs, "--every", every, "--truth", truth, *flags,
+            "--poses", dataset / "poses.txt", "--no-report")
+    source = loopbit.open_source(dataset / "images", every=every)
+    run = loopbit.run_folder(source, ours, truth=truth, positions_m=dataset / "poses.txt",
+                             evidence=False, **arguments)
+    for name in ("truth.csv", "not_false.csv", "ignore.csv", "unknown.csv", "positions.csv"):
+        assert (ours / name).read_bytes() == (theirs / name).read_bytes(), name
+    records = [json.loads((folder / "run.json").read_text()) for folder in (ours, theirs)]
+    assert records[0]["score"] == records[1]["score"]
+    assert records[0]["input"]["every"] == every == run.truth.every
+    assert str(truth) == records[0]["truth"]
+    expected = json.loads(command("eval", theirs, "--truth", truth, *flags, "--json"))
+    assert json.loads(loopbit.evaluate(theirs, truth, **arguments).to_json()) == expected
+    assert json.loads(loopbit.evaluate(run).to_json()) == expected
+    assert file != "truth.csv" or expected["recall"] > 0.5
+
+
+def test_truth_of_the_frames_read(dataset, world, tmp_path):
     source = loopbit.open_source(dataset / "images", every=2)
-    with pytest.raises(loopbit.OptionError, match="every_nth"):
-        loopbit.run_folder(source, tmp_path / "run", truth=dataset / "truth.csv")
+    positions = loopbit.read_positions(dataset / "poses.txt", [None] * 60, every=2)
     run = loopbit.run_folder(source, tmp_path / "run", evidence=False,
-                             truth=loopbit.every_nth(world.truth(), 2))
-    assert json.loads(run.record_json)["input"]["every"] == 2 and len(run.detections) == 60
+                             truth=loopbit.every_nth(world.truth(), 2), positions_m=positions)
+    assert len(run.detections) == 60 and run.positions_m == pytest.approx(positions, abs=1e-4)
+    assert positions[30, 2] == pytest.approx(world.pose(60)[1], abs=1e-4)
     assert loopbit.evaluate(run).decision.positives > 20
+    whole = world.truth()
+    same = loopbit.GroundTruth(whole.same_place.tolist(), whole.near_place.tolist(), every=2)
+    assert loopbit.evaluate(run, same).decision.wrong == 0
+    assert loopbit.evaluate(run, same).decision.right == loopbit.evaluate(run).decision.right
+
+
+def test_frames_that_nobody_knows():
+    truth = loopbit.GroundTruth([[10, 0, 2], [12, 4, 4]], unknown=[5, 12])
+    assert truth.unknown.tolist() == [5, 12] and truth.every == 1 and "unknown=2" in repr(truth)
+    decision = loopbit.evaluate(loopbit.MatchList([10, 11, 12], [5, 3, 9]), truth).decision
+    assert (decision.positives, decision.tolerated, decision.wrong, decision.ignored) == (1, 1, 1, 1)
+    with pytest.raises(loopbit.OptionError, match="every is 0"):
+        loopbit.GroundTruth([], every=0)
+
+
+BAD_ARGUMENTS = [
+    ({"keep_images": True, "map": None}, loopbit.OptionError, "keep_images .* give map"),
+    ({"protocol": "kitti"}, loopbit.OptionError, "give truth"),
+    ({"protocol": "nobody", "truth": "truth.csv"}, loopbit.OptionError, "no protocol 'nobody'"),
+    ({"protocol": "kitti", "truth": "truth.csv"}, loopbit.OptionError, "is a list of true places"),
+    ({"protocol": "fab-map", "truth": "poses.txt"}, loopbit.OptionError, "is poses"),
+    ({"protocol": "kitti", "truth": loopbit.GroundTruth([])}, loopbit.OptionError, "as the path"),
+    ({"truth": "none.csv"}, loopbit.InputError, "none.csv"),
+    ({"truth": "damaged.csv"}, loopbit.InputError, "line 2"),
+    ({"truth": "few.txt"}, loopbit.InputError, "has 3 poses"),
+    ({"truth": [[5, 1]]}, TypeError, "truth is"),
+    ({"positions_m": "none.txt"}, loopbit.InputError, "none.txt"),
+    ({"positions_m": "few.txt"}, loopbit.InputError, "has 3 poses"),
+    ({"positions_m": np.zeros((120, 2))}, ValueError, r"shape \(120, 2\)"),
+    ({"positions_m": np.zeros((119, 3))}, ValueError, "119 rows, but there are 120 frames"),
+    ({"positions_m": np.full((120, 3), np.inf)}, ValueError, "infinite"),
+    ({"on_bad_frame": 3}, TypeError, "on_bad_frame"),
+]
+
+
+@pytest.mark.parametrize("arguments, error, words", BAD_ARGUMENTS)
+def test_bad_arguments_cost_no_run(dataset, tmp_path, arguments, error, words):
+    (tmp_path / "damaged.csv").write_text("5,1\n6,one\n")
+    (tmp_path / "few.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
+    for name, value in arguments.items():
+        if name in ("truth", "positions_m") and isinstance(value, str):
+            path = dataset / value
+            arguments = {**arguments, name: path if path.exists() else tmp_path / value}
+    before = sorted(tmp_path.iterdir())
+    with pytest.raises(error, match=words):
+        loopbit.run_folder(dataset / "images", tmp_path / "run",
+                           **{"map": tmp_path / "town.db", **arguments})
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_what_is_wrong_in_the_end_leaves_the_run(world, tmp_path):
+    source = loopbit.World(world.options).source()
+    with pytest.raises(ValueError, match="7 rows, but there are 120 frames"):
+        loopbit.run_folder(source, tmp_path / "run", truth=world.truth(), evidence=False,
+                           positions_m=np.zeros((7, 3)))
+    run = loopbit.read_run(tmp_path / "run")
+    assert json.loads(run.record_json)["stopped_by"] == "end" and len(run.detections) == 120
+    assert len(run.positions_m) == 0 and loopbit.evaluate(run).decision.right > 20
+
+
+def test_no_input_is_replaced(dataset, tmp_path):
+    loopbit.run_folder(dataset / "images", tmp_path / "run", truth=dataset / "truth.csv")
+    with pytest.raises(OSError, match="truth.csv"):
+        loopbit.run_folder(dataset / "images", tmp_path / "run", overwrite=True,
+                           truth=tmp_path / "run" / "truth.csv")
 
 
 def test_score_is_that_of_the_command(command, run, dataset):
@@ -116,6 +204,7 @@ def test_a_run_is_scored_again_as_it_was(command, dataset, world, tmp_path):
     score = loopbit.evaluate(run)
     assert (score.protocol, score.tolerance_frames) == ("ibow-lcd", 40)
     assert json.loads(score.to_json()) == json.loads(command("eval", run.path, "--json"))
+    assert loopbit.evaluate(run, protocol="ibow-lcd").tolerance_frames == 40
     assert loopbit.evaluate(run, tolerance_frames=0).protocol == ""
 
 
@@ -148,6 +237,15 @@ def test_bad_evaluations(run, dataset):
         loopbit.evaluate(run, protocol="kitti", tolerance_frames=1)
     with pytest.raises(ValueError, match="fixes them"):
         loopbit.read_truth(dataset / "poses.txt", protocol="kitti", views=2)
+    with pytest.raises(loopbit.OptionError, match="as the path"):
+        loopbit.evaluate(run, protocol="kitti")
+    with pytest.raises(loopbit.OptionError, match="as the path"):
+        loopbit.evaluate(run, run.truth, protocol="ibow-lcd")
+    for setting, words in (({"poses": loopbit.PoseTruthOptions()}, "poses is about poses"),
+                           ({"views": 2}, "views is about a loop matrix"),
+                           ({"variable": "truth"}, "variable is about a loop matrix")):
+        with pytest.raises(loopbit.OptionError, match=words):
+            loopbit.read_truth(dataset / "truth.csv", **setting)
     with pytest.raises(ValueError, match="defined on poses, but .* is a list of true places"):
         loopbit.evaluate(run, dataset / "truth.csv", protocol="kitti")
     with pytest.raises(ValueError, match="what is true"):
