@@ -54,8 +54,9 @@ class ReportTest : public test::ScratchTest {
         {cv::Vec3d(0, 5, 0), cv::Vec3d(0, 5, 9), std::nullopt, cv::Vec3d(1, 5, 0)});
     RunRecord record;
     record.input = "<images>";
+    record.truth = "told by <a test>";
     record.score = evaluate(match_list(folder.detections()), truth);
-    folder.finish(record);
+    folder.write_record(record);
     ReportRun run;
     run.name = name;
     run.run = read_run(path(name));
@@ -87,6 +88,7 @@ TEST_F(ReportTest, TheMapIsThePlaneInWhichTheCameraMovedMost) {
   const Json json = Json::parse(report_json({finished_run("run")}))["runs"][0]["positions"];
   EXPECT_EQ(json["x_m"], Json::parse("[0.0, 0.0, null, 1.0]"));
   EXPECT_EQ(json["y_m"], Json::parse("[0.0, 9.0, null, 0.0]"));
+  EXPECT_EQ(json["axes"], Json::parse(R"(["x", "z"])"));
 }
 
 TEST_F(ReportTest, PicturesKeepToTheBudget) {
@@ -110,13 +112,117 @@ TEST_F(ReportTest, AnyDetectorsMatchesCanBeShown) {
   run.list = {{{.query = 5, .match = 1, .score = 3.0}, {.query = 5, .match = 2, .score = 4.0}}, {}};
   const Json json = Json::parse(report_json({run}))["runs"][0];
   EXPECT_EQ(json["frames"], 6);
+  EXPECT_EQ(json["frames_known"], false);
   EXPECT_EQ(json["match"][5], 2);
+  EXPECT_EQ(json["score"], Json::parse("[null, null, null, null, null, 4.0]"));
   EXPECT_EQ(json["verdict"][5], "loop");
   EXPECT_EQ(json["verdict"][0], "none");
-  for (const char* name : {"record", "threshold", "similarity", "times_ms", "truth", "evaluation",
-                           "positions", "similarity_matrix"}) {
+  for (const char* name : {"record", "threshold", "earlier_match", "similarity", "times_ms",
+                           "truth", "evaluation", "positions", "similarity_matrix"}) {
     EXPECT_TRUE(json[name].is_null()) << name;
   }
+}
+
+TEST_F(ReportTest, ADetectorThatListsNoFramesHasThoseOfTheOtherRuns) {
+  ReportRun other;
+  other.list = {{{.query = 2, .match = 1}}};
+  Json runs = Json::parse(report_json({finished_run("run"), other}))["runs"];
+  EXPECT_EQ(runs[1]["frames"], 4);
+  EXPECT_EQ(runs[1]["frames_known"], true);
+  other.positions_m.resize(9);
+  runs = Json::parse(report_json({other}))["runs"];
+  EXPECT_EQ(runs[0]["frames"], 9);
+  EXPECT_EQ(runs[0]["frames_known"], true);
+  other.positions_m.clear();
+  other.truth = GroundTruth{.same_place = {{6, 0, 1}}, .near_place = {}, .ignored = {}};
+  runs = Json::parse(report_json({other}))["runs"];
+  EXPECT_EQ(runs[0]["frames"], 7);
+  EXPECT_EQ(runs[0]["frames_known"], false);
+  EXPECT_EQ(runs[0]["verdict"][6], "missed");
+}
+
+TEST_F(ReportTest, ALoopIntoAnEarlierSessionIsALoopThatTruthDoesNotJudge) {
+  FinishedRun finished;
+  finished.detections = {{.frame = 0},
+                         {.frame = 1,
+                          .status = Status::loop,
+                          .earlier_match = SessionFrame{.session = 1, .frame = 17},
+                          .score = 40.0,
+                          .similarity = 0.5,
+                          .inliers = 30},
+                         {.frame = 2,
+                          .status = Status::low_score,
+                          .earlier_match = SessionFrame{.session = 2, .frame = 3},
+                          .score = 4.0},
+                         {.frame = 3, .status = Status::loop, .match = 0, .score = 20.0}};
+  ReportRun run;
+  run.list = match_list(finished.detections);
+  run.run = finished;
+  Json json = Json::parse(report_json({run}))["runs"][0];
+  EXPECT_EQ(json["earlier_match"], Json::parse("[null, [1, 17], [2, 3], null]"));
+  EXPECT_EQ(json["match"], Json::parse("[-1, -1, -1, 0]"));
+  EXPECT_EQ(json["score"], Json::parse("[0.0, 40.0, 4.0, 20.0]"));
+  EXPECT_EQ(json["inliers"][1], 30);
+  EXPECT_EQ(json["verdict"], Json::parse(R"(["none", "loop", "none", "loop"])"));
+  run.truth = GroundTruth{.same_place = {{1, 0, 0}, {3, 0, 0}}, .near_place = {}, .ignored = {}};
+  json = Json::parse(report_json({run}))["runs"][0];
+  EXPECT_EQ(json["verdict"], Json::parse(R"(["none", "elsewhere", "none", "right"])"));
+  EXPECT_EQ(json["evaluation"]["positives"], 1);
+  run.run.reset();
+  json = Json::parse(report_json({run}))["runs"][0];
+  EXPECT_EQ(json["verdict"][1], "elsewhere");
+  EXPECT_EQ(json["status_names"][json["status"][1].get<std::size_t>()], "loop");
+}
+
+TEST_F(ReportTest, TruthHasTheNumbersOfTheFramesRead) {
+  ReportRun run;
+  run.list = {{{.query = 4, .match = 1}}, std::vector<std::optional<double>>(5)};
+  run.truth = GroundTruth{.same_place = {{8, 2, 3}, {7, 0, 1}}};
+  run.truth->every = 2;
+  const Json json = Json::parse(report_json({run}))["runs"][0];
+  EXPECT_EQ(json["truth"]["same_place"], Json::parse("[4, 1, 1]"));
+  EXPECT_EQ(json["verdict"], Json::parse(R"(["none", "none", "none", "none", "right"])"));
+}
+
+TEST_F(ReportTest, WhatTruthIsStandsInTheRecordOfTheRunThatItWasGivenTo) {
+  ReportRun run = finished_run("run");
+  ReportRun other;
+  other.list = run.list;
+  other.truth = run.truth;
+  Json runs = Json::parse(report_json({run, other}))["runs"];
+  EXPECT_EQ(runs[0]["truth"]["source"], "told by <a test>");
+  EXPECT_EQ(runs[1]["truth"]["source"], "told by <a test>");
+  run.truth->same_place.pop_back();
+  runs = Json::parse(report_json({run, other}))["runs"];
+  EXPECT_TRUE(runs[0]["truth"]["source"].is_null());
+}
+
+TEST_F(ReportTest, TheMatrixOfManyFramesHasEveryMatch) {
+  constexpr int kFrames = 2049;
+  const auto matrix_of = [&](const std::string& name, bool with_match) {
+    test::Random random;
+    const BinaryContent place = test::random_content(random, 0.2);
+    RunFolder folder(path(name), false);
+    EvidenceWriter evidence(folder.evidence_path());
+    for (int frame = 0; frame < kFrames; ++frame) {
+      Detection detection{.frame = frame};
+      if (with_match && frame == 2001) detection.match = 1001;
+      folder.add(detection);
+      const bool is_place = frame == 2001 || frame == 1001;
+      evidence.add(frame, cv::Mat1b(32, 32, std::uint8_t{0}),
+                   {is_place ? place : BinaryContent{}, cv::Mat1f(64, 64, 1.0F), {}});
+    }
+    evidence.finish();
+    ReportRun run;
+    run.run = read_run(path(name));
+    run.list = match_list(run.run->detections);
+    return Json::parse(report_json({run}, {.max_pictures_mb = 0}))["runs"][0]["similarity_matrix"];
+  };
+  const Json without = matrix_of("without", false);
+  const Json with = matrix_of("with", true);
+  EXPECT_EQ(with["compared_every"], 2);
+  EXPECT_EQ(with["frames_per_cell"], 4);
+  EXPECT_NE(with["png"], without["png"]);
 }
 
 TEST_F(ReportTest, ThePageHoldsTheDataAndNothingEndsItEarly) {

@@ -31,11 +31,35 @@ using report::FrameView;
 
 constexpr std::string_view kDataPlace = "@REPORT_DATA@";
 
-int frame_count(const MatchList& list) {
-  int frames = static_cast<int>(list.times_s.size());
-  if (frames > 0) return frames;
-  for (const ReportedMatch& match : list.matches) frames = std::max(frames, match.query + 1);
-  return frames;
+struct FrameCount {
+  int frames = 0;
+  bool is_known = false;  ///< else there may be more
+};
+
+int listed_frames(const ReportRun& run) { return static_cast<int>(run.list.times_s.size()); }
+
+/// As many as there must be for all that is said about them. `truth`: in their numbers.
+int least_frames(const MatchList& list, const std::optional<GroundTruth>& truth) {
+  int last = -1;
+  for (const ReportedMatch& match : list.matches) last = std::max({last, match.query, match.match});
+  for (const int query : list.elsewhere) last = std::max(last, query);
+  if (truth) {
+    for (const PlaceRun& run : truth->same_place) last = std::max(last, run.query);
+    for (const PlaceRun& run : truth->near_place) last = std::max(last, run.query);
+    for (const int query : truth->ignored) last = std::max(last, query);
+  }
+  return last + 1;
+}
+
+/// Where a detector lists none, those of the other runs, which are about the same images, or as
+/// many as there are positions.
+FrameCount frame_count(const ReportRun& run, const std::optional<GroundTruth>& truth,
+                       const std::vector<ReportRun>& runs) {
+  if (const int listed = listed_frames(run); listed > 0) return {listed, true};
+  int known = static_cast<int>(run.positions_m.size());
+  for (const ReportRun& other : runs) known = std::max(known, listed_frames(other));
+  const int least = least_frames(run.list, truth);
+  return {std::max(known, least), known > 0 && known >= least};
 }
 
 /// Of each frame the match that speaks for it: accepted before rejected, then by score.
@@ -51,10 +75,21 @@ std::vector<const ReportedMatch*> best_matches(const MatchList& list, int frames
   return best;
 }
 
-std::string verdict_of(int frame, const ReportedMatch* match, const Judge* judge) {
-  const bool is_loop = match && match->is_loop;
+/// Which frames have an accepted match that is none of this run's frames.
+std::vector<bool> loops_elsewhere(const MatchList& list, int frames) {
+  std::vector<bool> elsewhere(static_cast<std::size_t>(frames));
+  for (const int query : list.elsewhere) {
+    if (query < frames) elsewhere[static_cast<std::size_t>(query)] = true;
+  }
+  return elsewhere;
+}
+
+std::string verdict_of(int frame, const ReportedMatch* match, bool is_elsewhere,
+                       const Judge* judge) {
+  const bool is_loop = is_elsewhere || (match && match->is_loop);
   if (!judge) return is_loop ? "loop" : "none";
   if (judge->is_ignored(frame)) return "ignored";
+  if (is_elsewhere) return "elsewhere";
   const auto judgement = is_loop ? std::optional(judge->judge(frame, match->match)) : std::nullopt;
   if (judgement == Judgement::right) return "right";
   if (judgement == Judgement::wrong) return "wrong";
@@ -72,16 +107,20 @@ std::unordered_map<int, int> true_places(const std::optional<GroundTruth>& truth
   return places;
 }
 
-std::vector<FrameView> frame_views(const ReportRun& run, int frames) {
+/// `truth`: in the numbers of the run's frames.
+std::vector<FrameView> frame_views(const ReportRun& run, const std::optional<GroundTruth>& truth,
+                                   int frames) {
   const auto judge =
       run.truth ? std::optional<Judge>(std::in_place, *run.truth, run.evaluation) : std::nullopt;
   const auto best = best_matches(run.list, frames);
-  const auto places = true_places(run.truth);
+  const auto elsewhere = loops_elsewhere(run.list, frames);
+  const auto places = true_places(truth);
   std::vector<FrameView> views;
   views.reserve(best.size());
   for (int frame = 0; frame < frames; ++frame) {
     const ReportedMatch* match = best[static_cast<std::size_t>(frame)];
-    FrameView view{frame, verdict_of(frame, match, judge ? &*judge : nullptr), {}};
+    const bool is_elsewhere = elsewhere[static_cast<std::size_t>(frame)];
+    FrameView view{frame, verdict_of(frame, match, is_elsewhere, judge ? &*judge : nullptr), {}};
     if (match) view.partners.push_back(match->match);
     if (view.verdict == "missed" || view.verdict == "wrong") {
       if (const auto place = places.find(frame); place != places.end()) {
@@ -113,6 +152,15 @@ Json column(const std::vector<Detection>& detections, const Of& of) {
   return json;
 }
 
+/// Best candidates in earlier sessions of the map, as pairs session, frame; null if none has one.
+Json earlier_matches(const std::vector<Detection>& detections) {
+  const auto has_one = [](const Detection& d) { return d.earlier_match.has_value(); };
+  if (std::none_of(detections.begin(), detections.end(), has_one)) return nullptr;
+  return column(detections, [](const Detection& d) {
+    return d.earlier_match ? Json{d.earlier_match->session, d.earlier_match->frame} : Json();
+  });
+}
+
 /// The columns that loops.csv has and other detectors' lists have not.
 void add_own_columns(Json& json, const std::vector<Detection>& detections) {
   const auto time = [&](double StepTimes::*step) {
@@ -123,6 +171,8 @@ void add_own_columns(Json& json, const std::vector<Detection>& detections) {
   json["status_names"] = names;
   json["status"] =
       column(detections, [](const Detection& d) { return static_cast<int>(d.status); });
+  json["earlier_match"] = earlier_matches(detections);
+  json["score"] = column(detections, [](const Detection& d) { return d.score; });
   json["similarity"] = column(detections, [](const Detection& d) { return d.similarity; });
   json["matches"] = column(detections, [](const Detection& d) { return d.matches; });
   json["inliers"] = column(detections, [](const Detection& d) { return d.inliers; });
@@ -143,15 +193,20 @@ void add_match_columns(Json& json, const MatchList& list, int frames) {
   }
   json["status_names"] = {"loop", "no_loop"};
   for (const char* name : {"status", "match", "score"}) json[name] = Json::array();
-  for (const ReportedMatch* match : best_matches(list, frames)) {
-    json["status"].push_back(match && match->is_loop ? 0 : 1);
+  const auto elsewhere = loops_elsewhere(list, frames);
+  const auto best = best_matches(list, frames);
+  for (std::size_t frame = 0; frame < best.size(); ++frame) {
+    const ReportedMatch* match = best[frame];
+    json["status"].push_back(elsewhere[frame] || (match && match->is_loop) ? 0 : 1);
     json["match"].push_back(match ? match->match : -1);
-    json["score"].push_back(match ? match->score : 0.0);
+    json["score"].push_back(match ? Json(match->score) : Json());
   }
-  for (const char* name : {"similarity", "matches", "inliers", "times_ms"}) json[name] = nullptr;
+  for (const char* name : {"earlier_match", "similarity", "matches", "inliers", "times_ms"}) {
+    json[name] = nullptr;
+  }
 }
 
-/// The two axes of the world along which the drive reaches furthest: the plane of the drive.
+/// The two axes of the world along which the positions reach furthest.
 std::array<int, 2> plane(const std::vector<std::optional<cv::Vec3d>>& positions_m) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::array<double, 3> low{kInfinity, kInfinity, kInfinity};
@@ -170,6 +225,8 @@ std::array<int, 2> plane(const std::vector<std::optional<cv::Vec3d>>& positions_
   return {flattest == 0 ? 1 : 0, flattest == 2 ? 1 : 2};
 }
 
+std::string axis_name(int axis) { return std::string(1, static_cast<char>('x' + axis)); }
+
 Json positions(std::vector<std::optional<cv::Vec3d>> positions_m, int frames) {
   positions_m.resize(static_cast<std::size_t>(frames));
   const auto has_position = [](const auto& position) { return position.has_value(); };
@@ -181,20 +238,23 @@ Json positions(std::vector<std::optional<cv::Vec3d>> positions_m, int frames) {
     x.push_back(position ? Json((*position)[across]) : Json());
     y.push_back(position ? Json((*position)[along]) : Json());
   }
-  return {{"x_m", x}, {"y_m", y}};
+  return {{"x_m", x}, {"y_m", y}, {"axes", {axis_name(across), axis_name(along)}}};
 }
 
-Json matrix_json(const EvidenceReader& evidence, int frames, int shift_tolerance_columns) {
+/// With every frame's own match, which is to be seen whatever else is left out.
+Json matrix_json(const EvidenceReader& evidence, const MatchList& list, int frames,
+                 int shift_tolerance_columns) {
   std::vector<BinaryContent> contents(static_cast<std::size_t>(frames));
   evidence.for_each_content([&](PlaceId frame, const BinaryContent& content) {
     if (frame >= 0 && frame < frames) contents[static_cast<std::size_t>(frame)] = content;
   });
-  const auto matrix = report::similarity_matrix(contents, shift_tolerance_columns);
+  const auto matrix = report::similarity_matrix(contents, list.matches, shift_tolerance_columns);
   if (matrix.cells.empty()) return nullptr;
   std::vector<unsigned char> png;
   cv::imencode(".png", matrix.cells, png);
   return {{"side", matrix.cells.rows},
           {"frames_per_cell", matrix.frames_per_cell},
+          {"compared_every", matrix.compared_every},
           {"png", report::base64(png)}};
 }
 
@@ -210,18 +270,41 @@ Json record_of(const ReportRun& run) {
   return record;
 }
 
-Json run_json(const ReportRun& run, std::size_t max_picture_bytes) {
-  const int frames = frame_count(run.list);
+bool is_same(const GroundTruth& a, const GroundTruth& b) {
+  return a.every == b.every && a.same_place == b.same_place && a.near_place == b.near_place &&
+         a.ignored == b.ignored && a.unknown == b.unknown;
+}
+
+/// What truth is, in the words of the run that it was given to; null where none has any.
+Json source_of(const GroundTruth& truth, const std::vector<ReportRun>& runs) {
+  for (const ReportRun& run : runs) {
+    if (!run.run || !run.run->truth || !is_same(truth, *run.run->truth)) continue;
+    const Json record = record_of(run);
+    if (record.is_object() && record.contains("truth")) return record["truth"];
+  }
+  return nullptr;
+}
+
+Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
+              std::size_t max_picture_bytes) {
+  const auto truth =
+      run.truth ? std::optional(every_nth(*run.truth, run.truth->every)) : std::nullopt;
+  const auto [frames, is_known] = frame_count(run, truth, runs);
   const Json record = record_of(run);
-  const std::vector<FrameView> views = frame_views(run, frames);
-  Json json{{"name", run.name}, {"record", record}, {"threshold", nullptr}, {"frames", frames}};
+  const std::vector<FrameView> views = frame_views(run, truth, frames);
+  Json json{{"name", run.name},
+            {"record", record},
+            {"threshold", nullptr},
+            {"frames", frames},
+            {"frames_known", is_known}};
   add_match_columns(json, run.list, frames);
   json["verdict"] = Json::array();
   for (const FrameView& view : views) json["verdict"].push_back(view.verdict);
   json["truth"] = nullptr;
-  if (run.truth) {
-    json["truth"] = {{"same_place", flat(run.truth->same_place)},
-                     {"near_place", flat(run.truth->near_place)}};
+  if (truth) {
+    json["truth"] = {{"same_place", flat(truth->same_place)},
+                     {"near_place", flat(truth->near_place)},
+                     {"source", source_of(*run.truth, runs)}};
   }
   json["evaluation"] = evaluation_json(run);
   json["positions"] = positions(run.positions_m, frames);
@@ -238,7 +321,7 @@ Json run_json(const ReportRun& run, std::size_t max_picture_bytes) {
   if (!run.run->evidence_path.empty()) {
     const EvidenceReader evidence(run.run->evidence_path);
     json["similarity_matrix"] =
-        matrix_json(evidence, frames, options.retrieval.shift_tolerance_columns);
+        matrix_json(evidence, run.list, frames, options.retrieval.shift_tolerance_columns);
     json["pictures"] = report::pictures(views, evidence, max_picture_bytes);
   }
   return json;
@@ -261,7 +344,7 @@ std::string report_json(const std::vector<ReportRun>& runs, const ReportOptions&
             {"default_options", Json::parse(to_json(LoopDetectorOptions{}))},
             {"runs", Json::array()}};
   for (const ReportRun& run : runs) {
-    json["runs"].push_back(run_json(run, static_cast<std::size_t>(max_bytes)));
+    json["runs"].push_back(run_json(run, runs, static_cast<std::size_t>(max_bytes)));
   }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -16,17 +16,23 @@ constexpr int kMaxFrames = 2048;
 
 int divided_up(int whole, int parts) { return (whole + parts - 1) / parts; }
 
-}  // namespace
+/// A xi as the matrix keeps it.
+std::uint8_t level(double similarity) {
+  return static_cast<std::uint8_t>(std::lround(255.0 * similarity));
+}
 
-SimilarityMatrix similarity_matrix(const std::vector<BinaryContent>& contents,
-                                   int shift_tolerance_columns) {
+/// Makes the cell of two frames as large as their xi.
+void raise(SimilarityMatrix& matrix, int later, int earlier, std::uint8_t level) {
+  std::uint8_t& cell =
+      matrix.cells(later / matrix.frames_per_cell, earlier / matrix.frames_per_cell);
+  cell = std::max(cell, level);
+}
+
+/// Every `matrix.compared_every`-th frame with all such before it.
+void compare_evenly(SimilarityMatrix& matrix, const std::vector<BinaryContent>& contents,
+                    int shift_tolerance_columns) {
+  const int step = matrix.compared_every;
   const int frames = static_cast<int>(contents.size());
-  const int step = std::max(1, divided_up(frames, kMaxFrames));
-  SimilarityMatrix matrix;
-  matrix.frames_per_cell = std::max(1, divided_up(frames, kMaxSide));
-  const int side = divided_up(frames, matrix.frames_per_cell);
-  matrix.cells = cv::Mat1b(side, side, std::uint8_t{0});
-
   std::vector<BinaryContent> compared;
   compared.reserve(static_cast<std::size_t>(divided_up(frames, step)));
   for (int frame = 0; frame < frames; frame += step) {
@@ -42,14 +48,32 @@ SimilarityMatrix similarity_matrix(const std::vector<BinaryContent>& contents,
         tolerated_shifts(compared[later], shift_tolerance_columns);
     active_kernels().max_overlaps(shifted.front().rows.data(), shifted.size(),
                                   compared.front().rows.data(), later, overlaps.data());
-    const int row = static_cast<int>(later) * step / matrix.frames_per_cell;
     for (std::size_t earlier = 0; earlier < later; ++earlier) {
-      const int larger = std::max({counts[later], counts[earlier], 1});
-      const auto level = static_cast<std::uint8_t>(std::lround(255.0 * overlaps[earlier] / larger));
-      std::uint8_t& cell =
-          matrix.cells(row, static_cast<int>(earlier) * step / matrix.frames_per_cell);
-      cell = std::max(cell, level);
+      const double larger = std::max({counts[later], counts[earlier], 1});
+      raise(matrix, static_cast<int>(later) * step, static_cast<int>(earlier) * step,
+            level(overlaps[earlier] / larger));
     }
+  }
+}
+
+}  // namespace
+
+SimilarityMatrix similarity_matrix(const std::vector<BinaryContent>& contents,
+                                   const std::vector<ReportedMatch>& matches,
+                                   int shift_tolerance_columns) {
+  const int frames = static_cast<int>(contents.size());
+  SimilarityMatrix matrix;
+  matrix.compared_every = std::max(1, divided_up(frames, kMaxFrames));
+  matrix.frames_per_cell = std::max(1, divided_up(frames, kMaxSide));
+  const int side = divided_up(frames, matrix.frames_per_cell);
+  matrix.cells = cv::Mat1b(side, side, std::uint8_t{0});
+  compare_evenly(matrix, contents, shift_tolerance_columns);
+  for (const ReportedMatch& match : matches) {
+    if (match.query >= frames || match.match >= match.query) continue;
+    raise(matrix, match.query, match.match,
+          level(similarity(contents[static_cast<std::size_t>(match.query)],
+                           contents[static_cast<std::size_t>(match.match)],
+                           shift_tolerance_columns)));
   }
   return matrix;
 }

@@ -7,18 +7,22 @@
 #include <opencv2/core.hpp>
 
 #include "loopbit/binary_content.hpp"
+#include "loopbit/match_list.hpp"
 
 namespace loopbit::report {
 
-/// xi of every two frames, for the eye.
+/// xi of two frames each, for the eye.
 struct SimilarityMatrix {
   int frames_per_cell = 1;
-  cv::Mat1b cells;  ///< square; row = later frame, column = earlier; 255 = xi of 1
+  int compared_every = 1;  ///< every so-many-th frame was compared with every so-many-th
+  cv::Mat1b cells;         ///< square; row = later frame, column = earlier; 255 = xi of 1
 };
 
 /// The largest xi in each cell of a matrix of at most 640 cells a side. Of more than 2,048 frames
-/// so many are compared, evenly spaced. Deterministic on every processor.
+/// at most so many are compared, evenly spaced, and all that `matches` names, each with its match.
+/// Deterministic on every processor.
 SimilarityMatrix similarity_matrix(const std::vector<BinaryContent>& contents,
+                                   const std::vector<ReportedMatch>& matches,
                                    int shift_tolerance_columns);
 
 }  // namespace loopbit::report
