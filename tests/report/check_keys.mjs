@@ -2,7 +2,17 @@
 // SPDX-License-Identifier: MIT
 // The page works without a pointer, and says what it is to those who do not see it.
 import assert from "node:assert/strict";
-import { address, drawn, embedded, goTo, settled, shownFrame } from "./browser.mjs";
+import {
+  address,
+  assertShows,
+  drawn,
+  embedded,
+  goTo,
+  kWide,
+  settled,
+  shownFrame,
+  textOf,
+} from "./browser.mjs";
 
 const framesWith = (run, filter) =>
   run.verdict.flatMap((verdict, i) => {
@@ -15,7 +25,7 @@ const framesWith = (run, filter) =>
 /** Arrow keys, Home and End walk exactly the frames that the filter lets through. */
 export async function checkFilters(page) {
   const run = (await embedded(page)).runs[0];
-  for (const filter of ["all", "loops", "right", "wrong", "missed", "tolerated"]) {
+  for (const filter of ["all", "loops", "right", "wrong", "missed", "tolerated", "elsewhere"]) {
     const frames = framesWith(run, filter);
     const button = page.locator(`[data-filter=${filter}]`);
     if (frames.length === 0) {
@@ -59,9 +69,20 @@ export async function checkTruePlace(page) {
   await goTo(page, missed);
   await page.locator(".partners button", { hasText: "true place" }).press("Enter");
   await settled(page);
-  const shown = Number(
-    (await page.textContent("#pair .picture:nth-child(2) .tag")).match(/\d+/)[0],
+  const tag = await page.textContent("#pair .picture:nth-child(2) .tag");
+  assert.match(tag, /^true place \d+$/, "the picture is called another name");
+  const shown = Number(tag.match(/\d+/)[0]);
+  const names = await page.$$eval("#pair .contents :is(img, canvas)", (all) =>
+    all.map((one) => one.alt ?? one.getAttribute("aria-label")),
   );
+  assert.ok(!names.some((name) => /match|candidate/.test(name)), `maps are called ${names}`);
+  if (run.inliers && run.match[missed] >= 0) {
+    const whose = await textOf(page, "pair.whose");
+    assert.match(whose, new RegExp(` ${run.match[missed]}, which is not shown`), "whose numbers");
+    assertShows(await textOf(page, "pair.inliers"), run.inliers[missed], "the match's inliers");
+  } else {
+    assert.equal(await textOf(page, "pair.inliers"), "–", "inliers of nothing");
+  }
   const triples = run.truth.same_place;
   const isTrue = triples.some(
     (query, i) =>
@@ -85,6 +106,22 @@ export async function checkAddress(page) {
     location.hash = "#frame=0";
   });
   await page.waitForFunction(() => document.getElementById("frame-number").value === "0");
+}
+
+/** Arrow keys move the table where it is too wide, else they walk. */
+export async function checkTable(page) {
+  if ((await page.$(".scroll .comparison")) === null) return;
+  const table = page.locator(".scroll", { has: page.locator(".comparison") });
+  await goTo(page, 0);
+  await page.setViewportSize({ width: 390, height: 800 });
+  await table.focus();
+  for (const key of ["ArrowRight", "End"]) await page.keyboard.press(key);
+  assert.equal(await shownFrame(page), 0, "a key for the table walks, too");
+  await page.waitForFunction((element) => element.scrollLeft > 0, await table.elementHandle());
+  await page.setViewportSize(kWide);
+  await table.focus();
+  await page.keyboard.press("ArrowRight");
+  assert.equal(await shownFrame(page), 1, "a table that shows all of itself takes keys");
 }
 
 export async function checkHelp(page) {

@@ -7,6 +7,27 @@ import { kWide, settled } from "./browser.mjs";
 const kA4Height_px = (297 - 2 * 14) * (96 / 25.4);
 const kPaperWidth_px = (210 - 2 * 12) * (96 / 25.4);
 
+/** Texts among the pair's facts that lie over each other. */
+const overprinted = () => {
+  const boxes = [...document.querySelectorAll("#pair .facts :is(dt, dd)")].map((one) => {
+    const range = document.createRange();
+    range.selectNodeContents(one);
+    return { text: one.textContent, box: range.getBoundingClientRect() };
+  });
+  const isOver = (a, b) =>
+    Math.min(a.right, b.right) - Math.max(a.left, b.left) > 1 &&
+    Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 8;
+  return boxes.flatMap((a, i) =>
+    boxes.slice(i + 1).flatMap((b) => (isOver(a.box, b.box) ? [`${a.text}, ${b.text}`] : [])),
+  );
+};
+
+/** Names of runs may be long: the bars still have room, and the table on paper its numbers. */
+async function checkLongNames(page) {
+  const bars = await page.$$eval("#times .bar", (all) => all.map((bar) => bar.clientWidth));
+  for (const width of bars) assert.ok(width >= 120, `a bar of ${width} px`);
+}
+
 export async function checkWidths(page) {
   for (const width of [1440, 1080, 1079, 768, 390, 360]) {
     await page.setViewportSize({ width, height: 800 });
@@ -19,9 +40,11 @@ export async function checkWidths(page) {
     const isBeside = pair.x >= plot.x + plot.width;
     const isBeneath = pair.y >= plot.y + plot.height - 1;
     assert.ok(width >= 1080 ? isBeside : isBeneath, `${width} px wide: the pair is misplaced`);
+    assert.deepEqual(await page.evaluate(overprinted), [], `${width} px wide: facts overprinted`);
   }
   await page.setViewportSize(kWide);
   await settled(page);
+  await checkLongNames(page);
 }
 
 /** Text that is too faint on what is behind it (WCAG 2, 1.4.3: 4.5 to 1). */
@@ -83,6 +106,9 @@ export async function checkPaper(page) {
       (one) => one.checkVisibility(),
     ).length,
     paper: getComputedStyle(document.documentElement).backgroundColor,
+    tables: [...document.querySelectorAll(".scroll")].map(
+      (table) => table.scrollWidth - table.clientWidth,
+    ),
     blocks: [...document.querySelectorAll("#summary, section")].map((one) => {
       const { width, height } = one.getBoundingClientRect();
       return { name: one.id, width, height };
@@ -90,6 +116,7 @@ export async function checkPaper(page) {
   }));
   assert.equal(seen.controls, 0, "controls on paper");
   assert.equal(seen.paper, "rgb(255, 255, 255)", "paper is not white");
+  for (const over of seen.tables) assert.ok(over <= 0, `${over} px of a table stick out`);
   for (const { name, width, height } of seen.blocks) {
     assert.ok(height <= kA4Height_px, `${name} is cut: ${height.toFixed(0)} px high`);
     assert.ok(width <= kPaperWidth_px, `${name} is too wide: ${width.toFixed(0)} px`);

@@ -2,16 +2,17 @@
 // SPDX-License-Identifier: MIT
 // The numbers on the page are those of the data and of run.json.
 import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
 import { assertShows, embedded, goTo, settled, textOf } from "./browser.mjs";
 
 const kSteps = ["content", "retrieval", "features", "verification"];
-const kFilters = ["loops", "right", "wrong", "missed", "tolerated"];
+const kFilters = ["loops", "right", "wrong", "missed", "tolerated", "elsewhere"];
 
 /** The nth readable time from below, as run.json counts. */
 function summaryOf(run, times) {
   const readable = times.filter((_, i) => run.status_names[run.status[i]] !== "unreadable");
   readable.sort((a, b) => a - b);
-  const at = (q) => readable[Math.floor(q * (readable.length - 1))] ?? 0;
+  const at = (q) => readable[Math.ceil(q * readable.length) - 1] ?? 0;
   const mean = readable.reduce((sum, time) => sum + time, 0) / Math.max(1, readable.length);
   return { mean, p50: at(0.5), p99: at(0.99), max: at(1) };
 }
@@ -20,22 +21,45 @@ function totalOf(run) {
   const total = run.times_ms.content.map((_, i) =>
     kSteps.reduce((sum, step) => sum + run.times_ms[step][i], 0),
   );
-  return run.record?.times_ms.total ?? summaryOf(run, total);
+  return run.record?.times_ms?.total ?? summaryOf(run, total);
 }
 
-const loopsOf = (run) => run.status.filter((status) => run.status_names[status] === "loop").length;
+const isLoop = (run, frame) => run.status_names[run.status[frame]] === "loop";
+const loopsOf = (run) => run.status.filter((_, frame) => isLoop(run, frame)).length;
+
+/** Shares of nothing are null. */
+function figuresOf(evaluation) {
+  const { positives, right, wrong, pairs } = evaluation;
+  return {
+    recall: positives > 0 ? evaluation.recall : null,
+    precision: right + wrong > 0 ? evaluation.precision : null,
+    recall_at_full_precision: positives > 0 ? evaluation.recall_at_full_precision : null,
+    average_precision: positives > 0 ? evaluation.average_precision : null,
+    "pairs.recall": pairs.positives > 0 ? pairs.recall : null,
+  };
+}
+
+async function assertFigure(page, key, value) {
+  const text = await textOf(page, key);
+  if (value === null) assert.equal(text, "–", `${key} is a share of nothing`);
+  else assertShows(text, value, key);
+}
 
 async function checkScore(page, run) {
   const { evaluation } = run;
+  const elsewhere =
+    loopsOf(run) - run.match.filter((match, i) => isLoop(run, i) && match >= 0).length;
+  const sentence = await textOf(page, "sentence");
+  assert.equal(sentence.includes("into earlier sessions"), elsewhere > 0, sentence);
+  if (elsewhere > 0) assert.ok(sentence.includes(String(elsewhere)), sentence);
   if (!evaluation) {
     assert.equal(await textOf(page, "recall"), null, "a recall without truth");
-    assert.match(await textOf(page, "sentence"), /no truth/);
+    assert.match(sentence, /no truth/);
     return;
   }
   const tally = (name) => run.verdict.filter((verdict) => verdict === name).length;
   for (const name of ["right", "wrong"])
     assert.equal(tally(name), evaluation[name], `verdicts: ${name}`);
-  const sentence = await textOf(page, "sentence");
   const wrong = evaluation.wrong === 0 ? "no" : String(evaluation.wrong);
   assert.ok(sentence.includes(`${wrong} wrong loop`), sentence);
   if (evaluation.positives > 0) {
@@ -45,16 +69,18 @@ async function checkScore(page, run) {
       found,
     );
   }
-  const numbers = {
-    recall_at_full_precision: evaluation.recall_at_full_precision,
-    average_precision: evaluation.average_precision,
-    "pairs.recall": evaluation.pairs.recall,
-  };
-  if (evaluation.positives > 0) numbers.recall = evaluation.recall;
-  if (evaluation.right + evaluation.wrong > 0) numbers.precision = evaluation.precision;
-  for (const [key, value] of Object.entries(numbers))
-    assertShows(await textOf(page, key), value, key);
-  if (numbers.precision !== undefined) {
+  const [, tolerated = "0", , apart = "0"] =
+    sentence.match(/(\d+) tolerated( \((\d+) of them at missed revisits\))?/) ?? [];
+  assert.equal(Number(tolerated), evaluation.tolerated, sentence);
+  assert.equal(Number(tolerated) - Number(apart), tally("tolerated"), sentence);
+  for (const [key, value] of Object.entries(figuresOf(evaluation)))
+    await assertFigure(page, key, value);
+  assert.equal(
+    await page.isVisible("#precision-recall .plot"),
+    evaluation.positives > 0 && evaluation.curve.some(({ right, wrong }) => right + wrong > 0),
+    "a curve of nothing",
+  );
+  if (evaluation.right + evaluation.wrong > 0) {
     const note = await textOf(page, "precision.note");
     const [low, high] = note.match(/([\d.]+) to ([\d.]+)/).slice(1);
     assertShows(low, evaluation.precision_interval[0], "low end of the interval");
@@ -72,7 +98,7 @@ async function checkTimes(page, run) {
   if (!run.times_ms) return;
   const shown = { total: totalOf(run) };
   for (const step of kSteps) {
-    shown[step] = run.record?.times_ms[step] ?? summaryOf(run, run.times_ms[step]);
+    shown[step] = run.record?.times_ms?.[step] ?? summaryOf(run, run.times_ms[step]);
   }
   for (const [step, summary] of Object.entries(shown)) {
     for (const figure of ["mean", "p50", "p99", "max"]) {
@@ -86,11 +112,37 @@ async function checkTimes(page, run) {
 
 async function checkRecord(page, run) {
   if (!run.record) return;
-  assertShows(await textOf(page, "frames_per_s"), run.record.frames_per_s, "frames a second");
+  if (run.record.frames_per_s === undefined) {
+    assert.equal(await textOf(page, "frames_per_s"), null, "a rate of a run that did not end");
+    assert.match(await page.textContent(".notice"), /not ended/);
+  } else {
+    assertShows(await textOf(page, "frames_per_s"), run.record.frames_per_s, "frames a second");
+  }
   const settings = Object.entries(run.record.options).flatMap(([part, of]) =>
     Object.entries(of).map(([name, value]) => [`options.${part}.${name}`, String(value)]),
   );
   for (const [key, value] of settings) assert.equal(await textOf(page, key), value, key);
+}
+
+/** The words of a command, as the shell takes them. */
+const wordsOf = (command) =>
+  execFileSync("sh", ["-c", `printf '%s\\n' ${command}`], { encoding: "utf8" })
+    .split("\n")
+    .slice(0, -1);
+
+/** The page's command is the run's, but for the folder that it writes to. */
+async function checkCommand(page, run) {
+  const command = await textOf(page, "command");
+  const given = run.record?.arguments ?? [];
+  if (given.length === 0) {
+    assert.equal(command, null, "a command that nobody gave");
+    return;
+  }
+  const words = given.filter((word) => word !== "--overwrite");
+  const out = words.indexOf("--out");
+  if (out < 0) words.push("--out", "again");
+  else words[out + 1] = "again";
+  assert.deepEqual(wordsOf(command), ["loopbit", ...words], "the command to run it again");
 }
 
 /** `runJson`: run.json's content, if there is one to compare with. */
@@ -98,13 +150,20 @@ export async function checkNumbers(page, runJson) {
   const { runs } = await embedded(page);
   const run = runs[0];
   if (runJson) assert.deepEqual(run.record, runJson, "the page's record is not run.json");
-  assertShows(await textOf(page, "frames"), run.frames, "frames");
-  if (run.record) assert.equal(run.frames, run.record.counts.frames, "frames of run.json");
+  if (run.frames_known) {
+    assertShows(await textOf(page, "frames"), run.frames, "frames");
+  } else {
+    assert.equal(await textOf(page, "frames"), "not known");
+    assertShows(await textOf(page, "frames.note"), run.frames, "frames at least");
+    assert.equal(await textOf(page, "loops.note"), "", "a share of nobody knows what");
+  }
+  if (run.record?.counts) assert.equal(run.frames, run.record.counts.frames, "frames of run.json");
   assertShows(await textOf(page, "loops"), loopsOf(run), "loops");
   if (runs.length === 1) await checkScore(page, run);
   else await checkComparison(page, runs);
   await checkTimes(page, run);
   await checkRecord(page, run);
+  await checkCommand(page, run);
   const counts = { all: run.frames, loops: loopsOf(run) };
   for (const name of kFilters.slice(1)) {
     counts[name] = run.verdict.filter((verdict) => verdict === name).length;
@@ -112,13 +171,16 @@ export async function checkNumbers(page, runJson) {
   for (const [name, count] of Object.entries(counts)) {
     assertShows(await textOf(page, `filter.${name}`), count, `frames that are ${name}`);
   }
+  const isOffered = await page.isVisible("[data-filter=elsewhere]");
+  assert.equal(isOffered, counts.elsewhere > 0, "the filter of loops elsewhere");
 }
 
 /** The table of several runs: its numbers, the order it sorts into, and the best of a column. */
 async function checkComparison(page, runs) {
   for (const [i, { evaluation }] of runs.entries()) {
-    for (const key of ["recall", "precision", "wrong", "average_precision"]) {
-      assertShows(await textOf(page, `run.${i}.${key}`), evaluation[key], `run ${i}: ${key}`);
+    assertShows(await textOf(page, `run.${i}.wrong`), evaluation.wrong, `run ${i}: wrong`);
+    for (const [key, value] of Object.entries(figuresOf(evaluation))) {
+      await assertFigure(page, `run.${i}.${key}`, value);
     }
   }
   const sort = page.locator(".comparison thead button", { hasText: /^recall$/ });
@@ -139,12 +201,27 @@ async function checkComparison(page, runs) {
     [...falling].reverse().sort((a, b) => a - b),
     "rising recall",
   );
-  const best = Math.max(...runs.map(({ evaluation }) => evaluation.recall));
-  for (const [i, { evaluation }] of runs.entries()) {
-    const isBest = await page.$eval(`[data-key="run.${i}.recall"]`, (cell) =>
+  for (const key of ["recall", "precision"]) await checkBest(page, runs, key);
+  const byTime = page.locator(".comparison thead button", { hasText: "mean ms" });
+  for (const _ of ["rising", "falling"]) {
+    await byTime.press("Enter");
+    const times = await page.$$eval(".comparison tbody [data-key$='time.mean']", (cells) =>
+      cells.map((cell) => cell.textContent),
+    );
+    const known = times.filter((time) => time !== "–").length;
+    assert.ok(!times.slice(0, known).includes("–"), `a run without times comes first: ${times}`);
+  }
+}
+
+/** Bold is what is the best of those that are known. */
+async function checkBest(page, runs, key) {
+  const values = runs.map(({ evaluation }) => figuresOf(evaluation)[key]);
+  const best = Math.max(...values.filter((value) => value !== null));
+  for (const [i, value] of values.entries()) {
+    const isBest = await page.$eval(`[data-key="run.${i}.${key}"]`, (cell) =>
       cell.classList.contains("best"),
     );
-    assert.equal(isBest, evaluation.recall === best, `run ${i} is the best`);
+    assert.equal(isBest, value !== null && value === best, `run ${i} has the best ${key}`);
   }
 }
 
@@ -157,6 +234,25 @@ export function spread(frames, count) {
   );
 }
 
+/** What is beside a frame, by its name; why it has no picture; and when the frame was. */
+async function checkTag(page, run, frame) {
+  const earlier = run.earlier_match?.[frame];
+  const kind = isLoop(run, frame) ? "match" : "best candidate";
+  const tag = await page.textContent("#pair .picture:nth-child(2) .tag");
+  assert.equal(tag, `${kind} ${earlier?.join(":") ?? run.match[frame]}`, `beside ${frame}`);
+  if (earlier) {
+    const why = await page.textContent("#pair .picture:nth-child(2) .absent");
+    const [session, number] = earlier;
+    const { path } = run.record.map;
+    assert.ok(why.startsWith(`Frame ${number} of session ${session} of ${path};`), why);
+  }
+  const time = run.timestamp_s?.[frame] ?? null;
+  if (time !== null) {
+    const first = run.timestamp_s.find((one) => one !== null);
+    assertShows(await textOf(page, "pair.time"), time - first, `time of ${frame}`);
+  }
+}
+
 /** Of some pairs all that the pair browser says. */
 export async function checkPairs(page) {
   const run = (await embedded(page)).runs[0];
@@ -166,6 +262,7 @@ export async function checkPairs(page) {
   for (const frame of [...spread(loops, 12), ...spread(others, 6)]) {
     await goTo(page, frame);
     const match = run.match[frame];
+    await checkTag(page, run, frame);
     assertShows(
       (await textOf(page, "pair.score")).split(/[≥<]/)[0],
       run.score[frame],

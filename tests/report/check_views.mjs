@@ -53,6 +53,41 @@ async function checkHover(page, view, frame) {
   await page.mouse.move(2, 2);
 }
 
+const drawingOf = (page, view) => page.$eval(`${view} canvas`, (canvas) => canvas.toDataURL());
+
+/** The ring, where there is one, lies within the plot. */
+async function assertInView(page, view, what) {
+  const ring = await ringOf(page, view);
+  if (!ring) return;
+  const box = await page.locator(`${view} .u-over`).boundingBox();
+  const [x, y] = [(ring.x - box.x) / box.width, (ring.y - box.y) / box.height];
+  assert.ok(Math.min(x, y) > -0.02 && Math.max(x, y) < 1.02, `${view}: out of view ${what}`);
+}
+
+/** Keys and buttons zoom about the selected frame, and the view goes with it to another. */
+async function checkKeyZoom(page, view) {
+  const before = await ringOf(page, view);
+  if (!before) return;
+  const drawn = await drawingOf(page, view);
+  await page.click(`${view} .zoom button >> nth=0`);
+  await page.focus(`${view} .plot`);
+  for (let i = 0; i < 6; ++i) await page.keyboard.press("+");
+  await settled(page);
+  assert.notEqual(await drawingOf(page, view), drawn, `${view}: the keys change nothing`);
+  const { height, width } = await page.locator(`${view} .u-over`).boundingBox();
+  const now = await ringOf(page, view);
+  const away = Math.hypot(now.x - before.x, now.y - before.y);
+  assert.ok(away < 0.03 * Math.max(width, height), `${view}: zooming moves the frame ${away} px`);
+  for (const key of ["Home", "End"]) {
+    await page.locator("[data-filter=loops]").focus();
+    await page.keyboard.press(key);
+    await assertInView(page, view, `after ${key}`);
+  }
+  await goTo(page, before.frame);
+  await page.focus(`${view} .plot`);
+  await page.keyboard.press("0");
+}
+
 /** Zooming moves what is drawn; showing all brings it back. */
 async function checkZoom(page, view) {
   const before = await ringOf(page, view);
@@ -70,10 +105,7 @@ async function checkZoom(page, view) {
     const now = await ringOf(page, view);
     assert.ok(Math.hypot(now.x - before.x, now.y - before.y) < 1, `${view}: 0 does not show all`);
   };
-  await page.click(`${view} .zoom button >> nth=0`);
-  await page.click(`${view} .zoom button >> nth=0`);
-  await moved("the button");
-  await reset();
+  await page.focus(`${view} .plot`);
   const box = await page.locator(`${view} .u-over`).boundingBox();
   const corner = [box.x + 0.9 * box.width, box.y + 0.2 * box.height];
   await page.mouse.move(...corner);
@@ -88,8 +120,8 @@ async function checkZoom(page, view) {
   await reset();
 }
 
-/** A cell far from every loop shows just its two frames. */
-async function checkCell(page, run) {
+/** A cell far from every loop shows just its two frames, and says what its colour stands for. */
+export async function checkCell(page, run) {
   if (run.frames < 60) return;
   const isFree = (row, column) =>
     run.status.every((status, i) => {
@@ -104,7 +136,10 @@ async function checkCell(page, run) {
   await ringOf(page, "#matrix");
   const box = await page.locator("#matrix .u-over").boundingBox();
   const place = (i, size) => ((i + 0.5) / run.frames) * size;
-  await page.mouse.click(box.x + place(column, box.width), box.y + place(row, box.height));
+  const cell = [box.x + place(column, box.width), box.y + place(row, box.height)];
+  await page.mouse.move(...cell);
+  if (run.similarity_matrix) await checkCellText(page, run, row, column);
+  await page.mouse.click(...cell);
   await settled(page);
   const { frame, with: against } = await address(page);
   const kCell = Math.ceil(run.frames / box.width) + 1;
@@ -113,8 +148,65 @@ async function checkCell(page, run) {
   assert.ok(Math.abs(shown - column) <= kCell, `matrix: column ${column} selects ${shown}`);
 }
 
+async function checkCellText(page, run, row, column) {
+  const { frames_per_cell: wide, compared_every: step } = run.similarity_matrix;
+  const tip = await page.textContent(".tip:not([hidden])");
+  const caption = await page.textContent("#matrix .caption");
+  if (wide === 1) {
+    assert.match(tip, /ξ 0\.\d{3}$/, `the cell says '${tip}'`);
+    assert.match(caption, /each query with every earlier frame/);
+    return;
+  }
+  const spans = tip.match(/largest ξ( compared)? of frames (\d+)–(\d+) × (\d+)–(\d+): 0\.\d{3}$/);
+  assert.ok(spans, `the cell says '${tip}'`);
+  assert.equal(spans[1] !== undefined, step > 1, tip);
+  const kNear = Math.max(2 * wide, run.frames / 100);
+  for (const [from, to, frame] of [
+    [2, 3, row],
+    [4, 5, column],
+  ]) {
+    assert.equal(spans[to] - spans[from], wide - 1, `as many frames as a cell has: ${tip}`);
+    assert.ok(Math.abs(spans[from] - frame) <= kNear, `${tip} is not about ${frame}`);
+  }
+  assert.equal(caption.includes(`one frame in ${step} `), step > 1, caption);
+}
+
+/** The ring shows on the picture as well as on the bare page. */
+async function checkMatrixRing(page, run) {
+  const seen = await page.$eval("#matrix .overlay .selected", (ring) => ({
+    stroke: getComputedStyle(ring).stroke,
+    paper: getComputedStyle(document.documentElement).backgroundColor,
+  }));
+  if (run.similarity_matrix === null) {
+    assert.notEqual(seen.stroke, seen.paper, "the ring has the colour of the paper");
+  } else {
+    assert.equal(seen.stroke, "rgb(255, 255, 255)", "the ring on the picture");
+  }
+}
+
+/** Where the plot of the distribution ends, ms: from where a frame is marked. */
+async function checkTimeEnd(page, run) {
+  const totals = run.times_ms.content.map(
+    (ms, i) =>
+      ms + run.times_ms.retrieval[i] + run.times_ms.features[i] + run.times_ms.verification[i],
+  );
+  const mean = totals.reduce((sum, ms) => sum + ms, 0) / totals.length;
+  const frame = totals.indexOf([...totals].sort((a, b) => a - b)[totals.length >> 1]);
+  await goTo(page, frame);
+  const [x, width] = await page.$eval("#times .overlay .pointer", (mark) => [
+    Number(mark.getAttribute("d").match(/^M([\d.]+)/)[1]),
+    mark.closest(".u-over").clientWidth,
+  ]);
+  const end = (totals[frame] * width) / x;
+  assert.ok(
+    end >= 0.999 * mean,
+    `the plot of times ends at ${end} ms, before the mean, ${mean} ms`,
+  );
+}
+
 async function checkTimeBars(page, run) {
   if (!run.times_ms || run.frames < 10) return;
+  if (run.status_names[run.status[0]] !== "unreadable") await checkTimeEnd(page, run);
   for (const nth of [0, 1]) {
     await goTo(page, 0);
     const over = page.locator("#times .u-over").nth(nth);
@@ -138,26 +230,43 @@ export async function checkViews(page) {
   const loops = run.status.flatMap((status, i) => (run.status_names[status] === "loop" ? [i] : []));
   const frames = spread(loops.length > 0 ? loops : run.status.map((_, i) => i), 5);
   for (const view of ["#trajectory", "#score", "#matrix", "#precision-recall"]) {
-    if ((await page.$(view)) === null) continue;
+    if (!(await page.isVisible(`${view} .plot`))) continue;
     const marked = view === "#matrix" || view === "#precision-recall" ? spread(loops, 5) : frames;
     await checkClicks(page, view, marked);
     if (marked[0] !== undefined) await checkHover(page, view, marked[0]);
   }
+  const withMatch = loops.find((frame) => run.match[frame] >= 0);
+  if (withMatch !== undefined) {
+    await goTo(page, withMatch);
+    await checkMatrixRing(page, run);
+  }
   if (run.frames > 10) {
     await goTo(page, frames.at(-1));
     for (const view of ["#trajectory", "#score", "#matrix"]) await checkZoom(page, view);
+    if (loops.length > 0) await page.locator("[data-filter=loops]").press("Enter");
+    await goTo(page, frames.at(-1));
+    for (const view of ["#trajectory", "#score", "#matrix"]) await checkKeyZoom(page, view);
+    await page.locator("[data-filter=all]").press("Enter");
   }
   await checkCell(page, run);
   await checkTimeBars(page, run);
 }
 
-/** The canvases are not blank: each holds a few colours. */
+/** The canvases are not blank: each holds a few colours, and no label is cut at the right edge. */
 export async function checkDrawn(page) {
-  const colours = await page.$$eval(".plot canvas", (canvases) =>
+  const drawn = await page.$$eval(".plot canvas", (canvases) =>
     canvases.map((canvas) => {
-      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-      return new Set(new Uint32Array(data.buffer)).size;
+      const { width, height } = canvas;
+      const { data } = canvas.getContext("2d").getImageData(0, 0, width, height);
+      const pixels = new Uint32Array(data.buffer);
+      return {
+        colours: new Set(pixels).size,
+        isCut: pixels.some((pixel, i) => i % width === width - 1 && pixel !== 0),
+      };
     }),
   );
-  for (const [i, count] of colours.entries()) assert.ok(count > 8, `plot ${i} is blank`);
+  for (const [i, { colours, isCut }] of drawn.entries()) {
+    assert.ok(colours > 8, `plot ${i} is blank`);
+    assert.ok(!isCut, `plot ${i}: its last label is cut`);
+  }
 }

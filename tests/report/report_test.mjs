@@ -18,12 +18,13 @@ import {
   checkFilters,
   checkHelp,
   checkNames,
+  checkTable,
   checkTabs,
   checkTruePlace,
 } from "./check_keys.mjs";
 import { checkPaper, checkThemes, checkWidths } from "./check_looks.mjs";
 import { checkNumbers, checkPairs } from "./check_numbers.mjs";
-import { checkDrawn, checkViews } from "./check_views.mjs";
+import { checkCell, checkDrawn, checkViews } from "./check_views.mjs";
 import { pageWith, sampleData } from "./sample.mjs";
 
 const kSamples = {
@@ -32,10 +33,17 @@ const kSamples = {
   "no poses": { poses: false },
   "no pictures": { pictures: false },
   "no loops": { noLoops: true },
+  "no revisits": { noRevisits: true },
+  "neither loops nor revisits": { noRevisits: true, noLoops: true },
+  "a map's later session": { map: true },
+  "a map's later session, no truth": { map: true, truth: false },
+  "a run that was killed": { cutOff: true },
+  "one slow frame": { slowFrame: true },
   "no room for pictures": { picturesMb: 0.2 },
   "unreadable frames": { frames: 150, unreadable: true },
   "another detector": { external: true },
-  "three runs": { runs: 3, external: true },
+  "another detector, frames not known": { external: true, truth: false, poses: false },
+  "three runs": { runs: 3, external: true, longNames: true },
   "one frame": { frames: 1 },
   "two frames": { frames: 2, truth: false, poses: false },
 };
@@ -117,6 +125,7 @@ async function checkReport(
     await run("address", checkAddress);
     await run("by Tab alone", async (page) => `${await checkTabs(page)} controls`);
     await run("help and number", checkHelp);
+    await run("keys in the table", checkTable);
     await run("names", checkNames);
     await run("widths", checkWidths);
     await run("paper", checkPaper);
@@ -157,6 +166,8 @@ async function checkSpeed(browser, file) {
     );
     const { runs } = await embedded(page);
     assert.equal(runs[0].frames, 10_000);
+    await checkDrawn(page);
+    await checkCell(page, runs[0]);
     assert.deepEqual(faults, []);
     console.log("ok      10,000 frames: speed");
     return [];

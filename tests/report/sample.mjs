@@ -3,8 +3,9 @@
 // Made-up but plausible report data, the same for the same options, for pages to be looked at and
 // tested without a detector:
 //
-//   node sample.mjs --page report.html --out FILE [--frames N] [--runs N] [--no-truth] [--no-poses]
-//                   [--no-pictures] [--no-loops] [--external] [--unreadable] [--pictures-mb MB]
+//   node sample.mjs --page report.html --out FILE [--frames N] [--runs N] [--pictures-mb MB]
+//                   [--no-truth] [--no-poses] [--no-pictures] [--no-loops] [--no-revisits]
+//                   [--external] [--unreadable] [--map] [--cut-off] [--slow-frame] [--long-names]
 import { readFileSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 import {
@@ -21,6 +22,9 @@ import {
 const kTolerance = 4;
 const kThreshold = 18;
 const kMaxSide = 640;
+const kMaxCompared = 2048;
+/** As cameras give it: seconds since 1970. */
+const kStart_s = 1403715273.25;
 const kStatuses = [
   "loop",
   "no_earlier_place",
@@ -98,10 +102,21 @@ function detect(places, quality, options, next) {
   return columns;
 }
 
+/** The later half of the run is in a place that an earlier session of the map knows. */
+function sendElsewhere(columns) {
+  columns.earlier_match = columns.match.map(() => null);
+  for (let frame = Math.floor(columns.match.length / 2); frame < columns.match.length; ++frame) {
+    if (columns.match[frame] < 0 || frame % 3 === 0) continue;
+    columns.earlier_match[frame] = [1, columns.match[frame] + 1000];
+    columns.match[frame] = -1;
+  }
+}
+
 function verdictsOf(columns, truth) {
   return columns.match.map((match, frame) => {
     const isLoop = columns.status[frame] === statusOf("loop");
     if (!truth) return isLoop ? "loop" : "none";
+    if (isLoop && match < 0) return "elsewhere";
     const isRight = isLoop && covers(truth.same_place, frame, match);
     const isNear = isLoop && covers(truth.near_place, frame, match);
     if (isRight) return "right";
@@ -140,9 +155,13 @@ function curveOf(columns, truth, positives) {
 }
 
 function evaluationOf(columns, verdicts, truth) {
-  const positives = truth.same_place.length / 3;
+  const revisits = truth.same_place.filter((_, i) => i % 3 === 0);
+  const positives = revisits.filter((query) => verdicts[query] !== "elsewhere").length;
   const tally = (name) => verdicts.filter((verdict) => verdict === name).length;
-  const [right, wrong, tolerated] = ["right", "wrong", "tolerated"].map(tally);
+  const [right, wrong] = ["right", "wrong"].map(tally);
+  const isNear = (frame) =>
+    columns.status[frame] === statusOf("loop") && ["tolerated", "missed"].includes(verdicts[frame]);
+  const tolerated = verdicts.filter((_, frame) => isNear(frame)).length;
   const curve = curveOf(columns, truth, positives);
   const full = curve.filter((point) => point.wrong === 0).at(-1);
   let before = 0;
@@ -161,7 +180,7 @@ function evaluationOf(columns, verdicts, truth) {
     right,
     tolerated,
     wrong,
-    ignored: 0,
+    ignored: tally("elsewhere"),
     recall: positives === 0 ? 0 : right / positives,
     precision: right + wrong === 0 ? 1 : right / (right + wrong),
     precision_interval: wilson(right, right + wrong),
@@ -179,28 +198,31 @@ function evaluationOf(columns, verdicts, truth) {
   };
 }
 
-function timesOf(frames, slowness, next) {
+/** `slowest_ms`: what one of the frames waits for its features. */
+function timesOf(frames, slowness, next, slowest_ms) {
   const tail = () => 1 + (next() < 0.03 ? 1.2 * next() : 0.15 * next());
   const of = (base, growth) =>
     Array.from({ length: frames }, (_, i) =>
       round((base + (growth * i) / frames) * slowness * tail(), 3),
     );
-  return {
+  const times = {
     content: of(0.4, 0),
     retrieval: of(0.02, 0.5),
     features: of(14, 0),
     verification: of(1, 13),
   };
+  if (slowest_ms > 0) times.features[frames >> 1] = slowest_ms;
+  return times;
 }
 
 function summaryOf(times) {
   const sorted = [...times].sort((a, b) => a - b);
-  const at = (q) => sorted[Math.floor(q * (sorted.length - 1))] ?? 0;
+  const at = (q) => sorted[Math.ceil(q * sorted.length) - 1] ?? 0;
   const mean = sorted.reduce((sum, time) => sum + time, 0) / Math.max(1, sorted.length);
   return { mean, p50: at(0.5), p99: at(0.99), max: at(1) };
 }
 
-function recordOf(columns, times, frames) {
+function recordOf(columns, times, frames, options) {
   const readable = (of) =>
     of.filter((_, frame) => columns.status[frame] !== statusOf("unreadable"));
   const total = times.content.map((_, i) => kSteps.reduce((sum, step) => sum + times[step][i], 0));
@@ -209,15 +231,24 @@ function recordOf(columns, times, frames) {
     kStatuses.map((name, i) => [name, columns.status.filter((status) => status === i).length]),
   );
   const wall_s = (total.reduce((sum, time) => sum + time, 0) / 1000) * 1.1;
+  const results = {
+    counts: { frames, by_status },
+    times_ms: { ...all, total: summaryOf(readable(total)) },
+    wall_s,
+    frames_per_s: frames / wall_s,
+    peak_memory_mib: 180.4,
+  };
   return {
     loopbit: "0.1.0",
+    arguments: options.map ? kMapArguments : [],
     input: {
       path: "street/images",
       description: `${frames} images in street/images`,
-      every: 1,
+      every: 2,
       limit: 0,
     },
-    stopped_by: "end",
+    stopped_by: options.cutOff ? "running" : "end",
+    ...(options.map ? { map: { path: "street.db", session: 2 } } : {}),
     options: {
       binary_content: { gamma: 1.5, blur_sigma_px: 2.5 },
       retrieval: { shift_tolerance_columns: kTolerance, top_k: 20, min_similarity: 0.2 },
@@ -231,13 +262,24 @@ function recordOf(columns, times, frames) {
       system: "Linux 6.1.0 x86_64",
     },
     threads: 1,
-    counts: { frames, by_status },
-    times_ms: { ...all, total: summaryOf(readable(total)) },
-    wall_s,
-    frames_per_s: frames / wall_s,
-    peak_memory_mib: 180.4,
+    ...(options.cutOff ? {} : results),
   };
 }
+
+/** With words that the shell would split or change. */
+const kMapArguments = [
+  "run",
+  "street/images",
+  "--truth",
+  "it's $HOME/truth.csv",
+  "--out",
+  "first run",
+  "--overwrite",
+  "--set",
+  "surf.max_keypoints=700",
+  "--map",
+  "street.db",
+];
 
 /** Contents and matrices by the number of frames, which is all that they depend on. */
 const madeContents = new Map();
@@ -262,7 +304,8 @@ function matrixOf(places, contents) {
       grey[row * side + column] = Math.round(255 * Math.min(1, xi));
     }
   }
-  return { side, frames_per_cell, png: pngOf(grey, side, side) };
+  const compared_every = Math.max(1, Math.ceil(places.length / kMaxCompared));
+  return { side, frames_per_cell, compared_every, png: pngOf(grey, side, side) };
 }
 
 /** Frames with their partners until `budget` bytes are full, spread over the run. */
@@ -293,27 +336,36 @@ function runOf(places, index, options) {
   const frames = places.length;
   const isExternal = options.external && index === options.runs - 1;
   const columns = detect(places, 1 - 0.35 * index, options, next);
-  const truth = options.truth ? truthOf(places) : null;
+  if (options.map) sendElsewhere(columns);
+  const listed = options.noRevisits ? { same_place: [], near_place: [] } : truthOf(places);
+  const truth = options.truth ? { ...listed, source: options.map ? "a list" : null } : null;
   const verdict = verdictsOf(columns, truth);
-  const times_ms = isExternal ? null : timesOf(frames, 1 + 0.4 * index, next);
+  const times_ms = isExternal
+    ? null
+    : timesOf(frames, 1 + 0.4 * index, next, options.slowFrame ? 1e4 : 0);
   const hasContents = options.pictures && !isExternal;
   const contents = madeOnce(madeContents, frames, () => places.map(contentAt));
   const matrix = () => matrixOf(places, frames <= 400 ? contents : null);
   const similarityOf = (match, frame) =>
     match < 0 ? 0 : similarity(contents[frame], contents[match], kTolerance);
   const positions = places.map(positionAt);
+  const name = isExternal
+    ? "another detector"
+    : ["street", "street, fewer keypoints", "street, third"][index];
   return {
-    name: isExternal
-      ? "another detector"
-      : ["street", "street, fewer keypoints", "street, third"][index],
-    record: isExternal ? null : recordOf(columns, times_ms, frames),
+    name: options.longNames ? `${name}, ${"as_careful_people_call_it".repeat(4)}` : name,
+    record: isExternal ? null : recordOf(columns, times_ms, frames, options),
     threshold: isExternal ? null : kThreshold,
     frames,
-    timestamp_s: isExternal ? null : places.map((_, i) => round(i * 0.1, 6)),
+    frames_known: !isExternal || options.poses || options.runs > 1,
+    timestamp_s: isExternal ? null : places.map((_, i) => round(kStart_s + i * 0.1, 6)),
     status_names: isExternal ? ["loop", "no_loop"] : kStatuses,
     status: isExternal ? columns.status.map((status) => (status === 0 ? 0 : 1)) : columns.status,
     match: columns.match,
-    score: columns.score,
+    earlier_match: columns.earlier_match ?? null,
+    score: isExternal
+      ? columns.score.map((score, frame) => (columns.match[frame] < 0 ? null : score))
+      : columns.score,
     similarity: isExternal
       ? null
       : columns.match.map((match, frame) => round(similarityOf(match, frame), 6)),
@@ -324,7 +376,11 @@ function runOf(places, index, options) {
     truth,
     evaluation: truth ? evaluationOf(columns, verdict, truth) : null,
     positions: options.poses
-      ? { x_m: positions.map(({ x }) => round(x, 4)), y_m: positions.map(({ y }) => round(y, 4)) }
+      ? {
+          x_m: positions.map(({ x }) => round(x, 4)),
+          y_m: positions.map(({ y }) => round(y, 4)),
+          axes: ["x", "z"],
+        }
       : null,
     similarity_matrix: hasContents ? madeOnce(madeMatrices, frames, matrix) : null,
     pictures: hasContents
@@ -340,8 +396,13 @@ const kDefaults = {
   poses: true,
   pictures: true,
   noLoops: false,
+  noRevisits: false,
   external: false,
   unreadable: false,
+  map: false,
+  cutOff: false,
+  slowFrame: false,
+  longNames: false,
   picturesMb: 12,
 };
 
@@ -369,8 +430,13 @@ function main(args) {
     poses: !flag("--no-poses"),
     pictures: !flag("--no-pictures"),
     noLoops: flag("--no-loops"),
+    noRevisits: flag("--no-revisits"),
     external: flag("--external"),
     unreadable: flag("--unreadable"),
+    map: flag("--map"),
+    cutOff: flag("--cut-off"),
+    slowFrame: flag("--slow-frame"),
+    longNames: flag("--long-names"),
     picturesMb: Number(value("--pictures-mb", kDefaults.picturesMb)),
   });
   writeFileSync(value("--out", "sample.html"), pageWith(page, data));

@@ -63,6 +63,12 @@ export function panned(view: Bounds, home: Bounds, axes: ZoomAxes, dx: number, d
   };
 }
 
+/** Whether the axes that can be zoomed show `place`. */
+export function shows(view: Bounds, axes: ZoomAxes, place: { x: number; y: number }): boolean {
+  const isIn = ([low, high]: Range, value: number) => value >= low && value <= high;
+  return isIn(view.x, place.x) && (axes !== "xy" || isIn(view.y, place.y));
+}
+
 export const middle = (bounds: Bounds) => ({
   x: (bounds.x[0] + bounds.x[1]) / 2,
   y: (bounds.y[0] + bounds.y[1]) / 2,

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 
 import { button, html, renew } from "./dom.ts";
+import { type Figures, figuresOf } from "./figures.ts";
 import * as format from "./format.ts";
 import { lineOf } from "./run_lines.ts";
 import type { RunModel } from "./run_model.ts";
@@ -15,44 +16,51 @@ interface Column {
   best: "high" | "low" | null;
 }
 
-const judged =
-  (of: (evaluation: NonNullable<RunModel["run"]["evaluation"]>) => number) => (model: RunModel) =>
-    model.run.evaluation ? of(model.run.evaluation) : null;
+const figure =
+  (name: keyof Figures) =>
+  ({ run }: RunModel) =>
+    run.evaluation && figuresOf(run.evaluation)[name];
 
 const kColumns: readonly Column[] = [
   {
     name: "recall",
     key: "recall",
-    value: judged((e) => e.recall),
+    value: figure("recall"),
     text: format.share,
     best: "high",
   },
   {
     name: "precision",
     key: "precision",
-    value: judged((e) => e.precision),
+    value: figure("precision"),
     text: format.share,
     best: "high",
   },
-  { name: "wrong", key: "wrong", value: judged((e) => e.wrong), text: format.count, best: "low" },
+  {
+    name: "wrong",
+    key: "wrong",
+    value: (m) => m.run.evaluation?.wrong ?? null,
+    text: format.count,
+    best: "low",
+  },
   {
     name: "recall at 100 % precision",
     key: "recall_at_full_precision",
-    value: judged((e) => e.recall_at_full_precision),
+    value: figure("recallAtFullPrecision"),
     text: format.share,
     best: "high",
   },
   {
     name: "average precision",
     key: "average_precision",
-    value: judged((e) => e.average_precision),
+    value: figure("averagePrecision"),
     text: format.share,
     best: "high",
   },
   {
     name: "pair recall",
     key: "pairs.recall",
-    value: judged((e) => e.pairs.recall),
+    value: figure("pairRecall"),
     text: format.share,
     best: "high",
   },
@@ -132,16 +140,20 @@ export class Comparison {
     this.show();
   }
 
-  /** The indices of the runs as they are shown. */
+  /** The indices of the runs as they are shown: those without a value last, either way. */
   private order(): number[] {
     const indices = this.models.map((_, index) => index);
     const sorted = this.sorted;
     if (!sorted) return indices;
     const value = (index: number) => {
       const model = this.models[index];
-      return (model && sorted.column.value(model)) ?? Number.NEGATIVE_INFINITY;
+      return model ? sorted.column.value(model) : null;
     };
-    return indices.sort((a, b) => sorted.direction * (value(a) - value(b)));
+    return indices.sort((a, b) => {
+      const [left, right] = [value(a), value(b)];
+      if (left === null || right === null) return Number(left === null) - Number(right === null);
+      return sorted.direction * (left - right);
+    });
   }
 
   private row(index: number): HTMLElement | null {

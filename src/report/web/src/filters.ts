@@ -11,6 +11,12 @@ import type { View } from "./view.ts";
 const iconOf = (filter: Filter) =>
   filter === "all" || filter === "loops" ? null : markIcon(filter);
 
+/** Verdicts need truth; few runs have loops elsewhere. */
+function isOffered(filter: Filter, frames: number, hasTruth: boolean): boolean {
+  if (filter === "elsewhere") return frames > 0;
+  return filter === "all" || filter === "loops" || hasTruth;
+}
+
 /** Which frames the arrow keys walk. */
 export class Filters implements View {
   readonly element = html("div", {
@@ -46,7 +52,7 @@ export class Filters implements View {
       if (!made || !count) continue;
       count.textContent = format.count(frames);
       made.disabled = frames === 0;
-      made.hidden = filter !== "all" && filter !== "loops" && !hasTruth;
+      made.hidden = !isOffered(filter, frames, hasTruth);
     }
   }
 

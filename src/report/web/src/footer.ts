@@ -10,6 +10,9 @@ import type { View } from "./view.ts";
 
 type Options = RunRecord["options"];
 
+/** What a repeated run is written to: the first one stays as it is. */
+const kNewFolder = "again";
+
 /** As one would type it: quoted where the shell would split or change it. */
 const quoted = (text: string) =>
   /^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
@@ -30,24 +33,33 @@ function changed(options: Options, defaults: Options): [string, string][] {
   return flat(options).filter(([name, value]) => usual.get(name) !== value);
 }
 
-/** The built-in world is an input without a path; its description says which one it was. */
-function inputOf({ input, counts }: RunRecord): string[] {
-  const world = input.description.match(/^built-in world, seed (\d+),.*?([\d.]+) laps/);
-  if (!world) return ["run", quoted(input.path)];
-  const [, seed = "", laps = ""] = world;
-  const frames = String(counts.frames * input.every);
-  return ["demo", "--seed", seed, "--frames", frames, "--world", `laps=${Number(laps)}`];
+/** The command of the run, with another folder to write to. */
+function commandOf(given: readonly string[]): string {
+  const words: string[] = [];
+  const end = given.includes("--") ? given.indexOf("--") : given.length;
+  let hasOut = false;
+  for (let i = 0; i < end; ++i) {
+    const word = given[i] ?? "";
+    if (word === "--overwrite") continue;
+    const isOut = word === "--out" || word.startsWith("--out=");
+    if (word === "--out") ++i;
+    if (!isOut) words.push(word);
+    else if (!hasOut) words.push("--out", kNewFolder);
+    hasOut ||= isOut;
+  }
+  if (!hasOut) words.push("--out", kNewFolder);
+  return ["loopbit", ...words, ...given.slice(end)].map(quoted).join(" ");
 }
 
-function commandOf(record: RunRecord, defaults: Options | undefined): string {
-  const { every, limit } = record.input;
-  const words = ["loopbit", ...inputOf(record), "--out", "again"];
-  if (every > 1) words.push("--every", String(every));
-  if (limit > 0) words.push("--limit", String(limit));
-  if (!defaults) return [...words, "--config", "options.json"].join(" ");
-  for (const [name, value] of changed(record.options, defaults))
-    words.push("--set", `${name}=${value}`);
-  return words.join(" ");
+/** What there is to say of a run that no command made. */
+function inputOf({ arguments: given, input }: RunRecord): string {
+  const who = given
+    ? "The run was made by the library, not by the command."
+    : "The record does not say how the run was started.";
+  const parts = [`${input.path} (${input.description})`];
+  if (input.every > 1) parts.push(`of every ${input.every} frames one`);
+  if (input.limit > 0) parts.push(`at most ${format.counted(input.limit, "frame")}`);
+  return `${who} Its input: ${parts.join(", ")}.`;
 }
 
 /** How the run came about, and how to repeat it. */
@@ -84,16 +96,13 @@ export class Footer implements View {
       );
       return;
     }
+    const given = record.arguments ?? [];
     this.details.replaceChildren(
-      html("h3", {}, "To run it again"),
-      command(commandOf(record, this.defaults)),
-      this.defaults
-        ? html("p", { class: "small" }, differing(record.options, this.defaults))
-        : html(
-            "p",
-            { class: "small" },
-            "options.json: the settings below, as run.json has them under options.",
-          ),
+      html("h3", {}, given.length > 0 ? "To run it again" : "Input and settings"),
+      given.length > 0 ? command(commandOf(given)) : html("p", {}, inputOf(record)),
+      ...(this.defaults
+        ? [html("p", { class: "small" }, differing(record.options, this.defaults))]
+        : []),
       html("h3", {}, "Machine"),
       machine(record),
       settings(record.options, this.defaults),
@@ -112,7 +121,7 @@ function differing(options: Options, defaults: Options): string {
 
 function command(text: string): HTMLElement {
   const copy = button({ class: "quiet" }, () => void navigator.clipboard?.writeText(text), "copy");
-  return html("div", { class: "command" }, html("code", {}, text), copy);
+  return html("div", { class: "command" }, html("code", { "data-key": "command" }, text), copy);
 }
 
 function machine({ machine, threads, wall_s, peak_memory_mib }: RunRecord): HTMLElement {
@@ -122,9 +131,9 @@ function machine({ machine, threads, wall_s, peak_memory_mib }: RunRecord): HTML
     `${machine.kernel} kernels`,
     machine.system,
     format.counted(threads, "thread"),
-    `${wall_s.toFixed(1)} s in all`,
-    `${peak_memory_mib.toFixed(0)} MiB at most`,
   ];
+  if (wall_s !== undefined) facts.push(`${wall_s.toFixed(1)} s in all`);
+  if (peak_memory_mib !== undefined) facts.push(`${peak_memory_mib.toFixed(0)} MiB at most`);
   return html("p", {}, facts.join(", "));
 }
 

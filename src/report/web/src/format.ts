@@ -10,14 +10,14 @@ export const count = (value: number): string => kGrouped.format(value);
 export const counted = (value: number, one: string, many = `${one}s`): string =>
   `${value === 0 ? "no" : count(value)} ${value <= 1 ? one : many}`;
 
-export const share = (value: number): string => value.toFixed(3);
+export const share = (value: number | null): string =>
+  value === null ? kMissing : value.toFixed(3);
 
-export function similarity(value: number | null): string {
-  return value === null ? kMissing : value.toFixed(3);
-}
+export const similarity = share;
 
 /** Scores are sums of halves as a rule, but another detector's may be anything. */
-export function score(value: number): string {
+export function score(value: number | null): string {
+  if (value === null) return kMissing;
   if (Number.isInteger(value)) return count(value);
   const digits = Math.abs(value) >= 100 ? 1 : Math.abs(value) >= 1 ? 2 : 4;
   return value.toFixed(digits).replace(/\.?0+$/, "");

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 
 import * as format from "./format.ts";
+import { candidateName } from "./partner.ts";
 import type { RunModel } from "./run_model.ts";
 import { nameOfStatus } from "./status_text.ts";
 import { nameOf } from "./verdicts.ts";
@@ -9,10 +10,11 @@ import { nameOf } from "./verdicts.ts";
 /** What the pointer is told about a frame. */
 export function frameText(model: RunModel, frame: number): string[] {
   const mark = model.mark(frame);
-  const match = model.match(frame);
   const lines = [`frame ${frame}`];
   if (mark) lines[0] += `: ${nameOf(mark)}`;
   else lines[0] += `: ${nameOfStatus(model.status(frame))}`;
-  if (match !== null) lines.push(`match ${match}, score ${format.score(model.score(frame))}`);
+  if (model.matchName(frame) !== null) {
+    lines.push(`${candidateName(model, frame)}, score ${format.score(model.score(frame))}`);
+  }
   return lines;
 }

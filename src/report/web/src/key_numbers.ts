@@ -2,9 +2,15 @@
 // SPDX-License-Identifier: MIT
 
 import { type Child, html } from "./dom.ts";
+import { figuresOf } from "./figures.ts";
 import * as format from "./format.ts";
-import type { Evaluation } from "./report_data.ts";
+import type { Evaluation, RunRecord } from "./report_data.ts";
 import type { RunModel } from "./run_model.ts";
+
+const kNoRevisits = "no revisits";
+
+/** Its frames are drawn, not decoded. */
+const isBuiltInWorld = ({ input }: RunRecord) => input.description.startsWith("built-in world");
 
 function number(name: string, key: string, value: string, ...note: Child[]): HTMLElement {
   return html(
@@ -18,20 +24,20 @@ function number(name: string, key: string, value: string, ...note: Child[]): HTM
 
 function judged(e: Evaluation): HTMLElement[] {
   const [low, high] = e.precision_interval;
+  const figures = figuresOf(e);
   const loops = e.right + e.wrong;
+  const ofRevisits = (note: string) => (e.positives === 0 ? kNoRevisits : note);
   return [
     number(
       "recall",
       "recall",
-      e.positives === 0 ? "–" : format.share(e.recall),
-      e.positives === 0
-        ? "no revisits"
-        : `${format.count(e.right)} of ${format.count(e.positives)}`,
+      format.share(figures.recall),
+      ofRevisits(`${format.count(e.right)} of ${format.count(e.positives)}`),
     ),
     number(
       "precision",
       "precision",
-      loops === 0 ? "–" : format.share(e.precision),
+      format.share(figures.precision),
       loops === 0
         ? "no loops to judge"
         : `${format.count(e.wrong)} wrong of ${format.count(loops)}; 95 %: ${format.share(low)} to ${format.share(high)}`,
@@ -39,46 +45,56 @@ function judged(e: Evaluation): HTMLElement[] {
     number(
       "recall at 100 % precision",
       "recall_at_full_precision",
-      format.share(e.recall_at_full_precision),
-      e.score_at_full_precision === null
-        ? "the best score is wrong"
-        : `from score ${format.score(e.score_at_full_precision)}`,
+      format.share(figures.recallAtFullPrecision),
+      ofRevisits(limitOf(e)),
     ),
     number(
       "average precision",
       "average_precision",
-      format.share(e.average_precision),
-      "area under the curve",
+      format.share(figures.averagePrecision),
+      ofRevisits("area under the curve"),
     ),
     number(
       "pair recall",
       "pairs.recall",
-      format.share(e.pairs.recall),
-      `${format.count(e.pairs.right)} of ${format.counted(e.pairs.positives, "pair")}`,
+      format.share(figures.pairRecall),
+      figures.pairRecall === null
+        ? "no true pairs"
+        : `${format.count(e.pairs.right)} of ${format.counted(e.pairs.positives, "pair")}`,
     ),
   ];
 }
 
+/** From where on every loop would be right. */
+function limitOf({ score_at_full_precision: score, curve }: Evaluation): string {
+  if (score !== null) return `from score ${format.score(score)}`;
+  return curve.length === 0 ? "no candidates" : "the best score is wrong";
+}
+
+/** How many frames there are, and how far they are known. */
+function framesOf(model: RunModel): HTMLElement {
+  const { frames } = model;
+  if (!model.run.frames_known) {
+    return number("frames", "frames", "not known", `at least ${format.count(frames)}`);
+  }
+  let note = `${format.count(model.framesWithCandidate())} with a match`;
+  if (model.tellsUnreadable()) {
+    const unreadable = model.unreadable();
+    note = unreadable > 0 ? `${format.count(unreadable)} unreadable` : "all readable";
+  }
+  return number("frames", "frames", format.count(frames), note);
+}
+
 /** The numbers one looks for first. What a table above already says of several runs is left out. */
 export function keyNumbers(model: RunModel, isCompared: boolean): HTMLElement[] {
-  const { evaluation, record } = model.run;
+  const { evaluation, record, frames_known } = model.run;
   const time = model.totalTime();
-  const unreadable = model.frames - countReadable(model);
   const loops = model.framesIn("loops").length;
+  const share = ((100 * loops) / Math.max(1, model.frames)).toFixed(1);
   const found = evaluation && !isCompared ? judged(evaluation) : [];
   const spent = [
-    number(
-      "frames",
-      "frames",
-      format.count(model.frames),
-      unreadable > 0 ? `${format.count(unreadable)} unreadable` : "all readable",
-    ),
-    number(
-      "loops",
-      "loops",
-      format.count(loops),
-      `${((100 * loops) / Math.max(1, model.frames)).toFixed(1)} % of frames`,
-    ),
+    framesOf(model),
+    number("loops", "loops", format.count(loops), frames_known ? `${share} % of frames` : null),
   ];
   if (time) {
     spent.push(
@@ -90,21 +106,17 @@ export function keyNumbers(model: RunModel, isCompared: boolean): HTMLElement[] 
       ),
     );
   }
-  if (record) {
+  if (record?.frames_per_s !== undefined) {
+    const source = isBuiltInWorld(record) ? "with drawing the world" : "with decoding";
+    const memory = `${format.count(Math.round(record.peak_memory_mib ?? 0))} MiB`;
     spent.push(
       number(
         "frames a second",
         "frames_per_s",
         format.rate(record.frames_per_s),
-        `with decoding, ${format.count(Math.round(record.peak_memory_mib))} MiB`,
+        `${source}, ${memory}`,
       ),
     );
   }
   return [html("dl", {}, ...found), html("dl", {}, ...spent)];
-}
-
-function countReadable(model: RunModel): number {
-  let readable = 0;
-  for (let frame = 0; frame < model.frames; ++frame) readable += model.isReadable(frame) ? 1 : 0;
-  return readable;
 }

@@ -8,7 +8,10 @@ const kKeys: readonly (readonly [string, string])[] = [
   ["← →", "the frame before, the frame after, among those that the filter lets through"],
   ["Home End", "the first, the last of them"],
   ["Tab", "to the next control or plot"],
-  ["+ − 0", "zoom in, zoom out, show all, in the plot that has the focus"],
+  [
+    "+ − 0",
+    "zoom in on the selected frame, zoom out, show all, in the plot that has the focus; it follows the frame",
+  ],
   ["wheel, drag", "zoom and move a plot that was clicked; Ctrl + wheel zooms any"],
   ["?", "this list"],
   ["Esc", "close it"],
@@ -30,10 +33,14 @@ export function keyHelp(): { dialog: HTMLDialogElement; opener: HTMLButtonElemen
   return { dialog, opener };
 }
 
-const takesKeys = (target: EventTarget | null) =>
-  target instanceof HTMLInputElement || target instanceof HTMLTextAreaElement;
+/** A field of text, or a table that arrow keys move sideways. */
+function takesKeys(target: EventTarget | null): boolean {
+  if (target instanceof HTMLInputElement || target instanceof HTMLTextAreaElement) return true;
+  const table = target instanceof Element ? target.closest(".scroll") : null;
+  return table !== null && table.scrollWidth > table.clientWidth;
+}
 
-/** Arrow keys walk from anywhere but a field of text. */
+/** Arrow keys walk from anywhere else. */
 export function listenToKeys(store: Store, dialog: HTMLDialogElement): void {
   const acts: Record<string, () => void> = {
     ArrowLeft: () => store.walk(-1),

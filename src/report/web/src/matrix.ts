@@ -8,6 +8,7 @@ import { frameText } from "./frame_text.ts";
 import { Plot } from "./plot.ts";
 import type { Hit } from "./plot_spec.ts";
 import { nearest, type Projection } from "./projection.ts";
+import type { SimilarityMatrix } from "./report_data.ts";
 import type { RunModel } from "./run_model.ts";
 import { decodeMatrix, type SimilarityImage } from "./similarity_image.ts";
 import type { Selection, Store } from "./store.ts";
@@ -44,6 +45,7 @@ export class Matrix implements View {
       draw: (ctx, to, theme) => this.draw(ctx, to, theme),
       hit: (pixel, to) => this.hitAt(pixel, to),
       selected: (to) => this.selected(to),
+      place: () => this.place(),
       select: (hit) => this.store.select(hit.frame, hit.against ?? "match"),
     });
     this.element = section(
@@ -57,7 +59,7 @@ export class Matrix implements View {
 
   showRun(model: RunModel): void {
     const { similarity_matrix: matrix, truth } = model.run;
-    this.image = null;
+    this.showImage(null);
     this.framesPerCell = matrix?.frames_per_cell ?? Math.max(1, Math.ceil(model.frames / kMaxSide));
     const side = matrix?.side ?? Math.ceil(model.frames / this.framesPerCell);
     this.truth = truth ? truthOverlay(truth.same_place, side, this.framesPerCell) : null;
@@ -66,25 +68,36 @@ export class Matrix implements View {
     if (!matrix) return;
     void decodeMatrix(matrix).then((image) => {
       if (this.store.model !== model) return;
-      this.image = image;
+      this.showImage(image);
       this.showKey();
       this.plot.redraw();
     });
   }
 
   showSelection(_: Selection): void {
-    this.plot.mark();
+    this.plot.follow();
+  }
+
+  /** The cell of the selected frame and what is beside it. */
+  private place(): Point | null {
+    const partner = this.store.model.partner(this.store.now);
+    return partner === null ? null : { x: partner + 0.5, y: this.store.now.frame + 0.5 };
+  }
+
+  private showImage(image: SimilarityImage | null): void {
+    this.image = image;
+    this.element.classList.toggle("no-picture", image === null);
   }
 
   private describe(model: RunModel): void {
+    const hasPairs = (model.run.truth?.same_place.length ?? 0) > 0;
+    const outlined = hasPairs ? "Outlined: true pairs." : "There is no true pair to outline.";
     const truth = this.truth
-      ? "Outlined: true pairs."
+      ? outlined
       : "No truth is known; --truth FILE outlines the true pairs.";
     const matrix = model.run.similarity_matrix;
-    const cell = `${format.count(this.framesPerCell)} x ${format.count(this.framesPerCell)} frames`;
-    const cells = this.framesPerCell > 1 ? ` A cell is the largest ξ of ${cell}.` : "";
     this.caption.textContent = matrix
-      ? `The similarity ξ of each query with every earlier frame.${cells} ${truth} Click a cell to see its two frames.`
+      ? `${meaningOfCells(matrix)} ${truth} Click a cell to see its two frames.`
       : `Loops by query and match; the run kept no contents to compare. ${truth}`;
     this.key.replaceChildren();
   }
@@ -143,7 +156,7 @@ export class Matrix implements View {
   /** A loop's mark where one is near, else the pair under the pointer. */
   private hitAt(pixel: Point, to: Projection): Hit | null {
     const model = this.store.model;
-    const loops = model.framesIn("loops");
+    const loops = model.framesIn("loops").filter((frame) => model.isLoopHere(frame));
     const place = (frame: number) => ({ x: (model.match(frame) ?? 0) + 0.5, y: frame + 0.5 });
     const reach = model.frames * Math.abs(to.x(1) - to.x(0)) > 4 * to.width ? 12 : 7;
     const near = nearest(
@@ -161,32 +174,50 @@ export class Matrix implements View {
     const frame = Math.floor(to.atY(pixel.y));
     const earlier = Math.floor(to.atX(pixel.x));
     if (earlier < 0 || frame <= earlier || frame >= model.frames) return null;
-    const against = earlier === model.match(frame) ? "match" : earlier;
     const text = [`query ${frame}`, `earlier frame ${earlier}`];
-    const similarity = this.similarityAt(frame, earlier);
-    if (similarity !== null) text.push(`ξ ${format.similarity(similarity)}`);
-    return { frame, against, at: { x: earlier + 0.5, y: frame + 0.5 }, cross: true, text };
+    text.push(...this.cellText(frame, earlier));
+    return { frame, against: earlier, at: { x: earlier + 0.5, y: frame + 0.5 }, cross: true, text };
   }
 
-  private similarityAt(frame: number, earlier: number): number | null {
-    if (!this.image) return null;
+  /** What the cell of two frames says, and of which frames it says so. */
+  private cellText(frame: number, earlier: number): string[] {
+    if (!this.image) return [];
     const { side, framesPerCell, levels } = this.image;
     const [row, column] = [Math.floor(frame / framesPerCell), Math.floor(earlier / framesPerCell)];
-    return (levels[row * side + column] ?? 0) / 255;
+    const similarity = format.similarity((levels[row * side + column] ?? 0) / 255);
+    if (framesPerCell === 1) return [`ξ ${similarity}`];
+    const span = (cell: number) => {
+      const last = Math.min(this.store.model.frames, (cell + 1) * framesPerCell) - 1;
+      return `${cell * framesPerCell}–${last}`;
+    };
+    const step = this.store.model.run.similarity_matrix?.compared_every ?? 1;
+    const what = step > 1 ? "largest ξ compared" : "largest ξ";
+    return [`${what} of frames ${span(row)} × ${span(column)}: ${similarity}`];
   }
 
   private selected(to: Projection): SVGElement[] {
     const { frame } = this.store.now;
-    const partner = this.store.model.partner(this.store.now);
+    const place = this.place();
     const y = to.y(frame + 0.5);
     const marks: SVGElement[] = [
       svg("line", { class: "hair", x1: 0, x2: to.x(frame + 0.5), y1: y, y2: y }),
     ];
-    if (partner !== null) {
-      const x = to.x(partner + 0.5);
+    if (place) {
+      const x = to.x(place.x);
       marks.push(svg("line", { class: "hair", x1: x, x2: x, y1: y, y2: to.height }));
       marks.push(svg("circle", { class: "selected", cx: x, cy: y, r: 8, "data-frame": frame }));
     }
     return marks;
   }
+}
+
+/** What was compared, and what became of it where a cell stands for several frames. */
+function meaningOfCells(matrix: SimilarityMatrix): string {
+  const { frames_per_cell: wide, compared_every: step } = matrix;
+  if (wide === 1) return "The similarity ξ of each query with every earlier frame.";
+  const cell = `A cell is the largest ξ of ${wide} × ${wide} frames`;
+  if (step === 1) {
+    return `The similarity ξ of each query with every earlier frame. ${cell}.`;
+  }
+  return `The similarity ξ of one frame in ${step} with one in ${step} before it, and of every frame with its own match. ${cell}, as far as they were compared.`;
 }

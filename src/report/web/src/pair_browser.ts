@@ -7,6 +7,7 @@ import * as format from "./format.ts";
 import { PairContents } from "./pair_contents.ts";
 import { pairFacts } from "./pair_facts.ts";
 import { PairPictures } from "./pair_pictures.ts";
+import { candidateName } from "./partner.ts";
 import type { RunModel } from "./run_model.ts";
 import type { Selection, Store } from "./store.ts";
 import type { View } from "./view.ts";
@@ -68,17 +69,14 @@ export class PairBrowser implements View {
 
   showSelection(selection: Selection): void {
     const model = this.store.model;
-    const { frame, against } = selection;
-    const partner = model.partner(selection);
     this.filters.showSelection(selection);
-    this.number.value = String(frame);
+    this.number.value = String(selection.frame);
     this.showPosition(model, selection);
     this.showPartners(model, selection);
-    const withLines = this.withLines && against === "match";
     setPressed(this.lines, this.withLines);
-    this.facts.replaceChildren(...pairFacts(model, frame));
-    this.contents.show(model, frame, partner);
-    void this.pictures.show(model, frame, partner, withLines);
+    this.facts.replaceChildren(...pairFacts(model, selection));
+    this.contents.show(model, selection);
+    void this.pictures.show(model, selection, this.withLines);
   }
 
   private showPosition(model: RunModel, { frame, filter }: Selection): void {
@@ -99,9 +97,8 @@ export class PairBrowser implements View {
     const truth = model.truePlace(frame);
     const verdict = model.verdict(frame);
     const isChoice = verdict === "missed" || verdict === "wrong" || against !== "match";
-    const match = model.match(frame);
     if (isChoice) {
-      add(match === null ? "no candidate" : `best candidate ${match}`, "match");
+      add(candidateName(model, frame), "match");
       if (truth !== null) add(`true place ${truth}`, "truth");
       if (typeof against === "number") add(`frame ${against}`, against);
     }

@@ -4,8 +4,10 @@
 import { type Content, contentOf, kSide, overlapOf } from "./content.ts";
 import { html } from "./dom.ts";
 import * as format from "./format.ts";
+import { partnerName } from "./partner.ts";
 import type { Picture } from "./report_data.ts";
 import type { RunModel } from "./run_model.ts";
+import type { Selection } from "./store.ts";
 import { onThemeChange, type Theme, theme } from "./theme.ts";
 
 type Paint = (pixel: number, theme: Theme) => string | null;
@@ -21,18 +23,19 @@ export class PairContents {
     });
   }
 
-  show(model: RunModel, frame: number, partner: number | null): void {
+  show(model: RunModel, selection: Selection): void {
     this.repaint = [];
-    const query = model.run.pictures[frame];
-    const match = partner === null ? undefined : model.run.pictures[partner];
-    const queryContent = query?.content ? contentOf(query.content) : null;
-    const matchContent = match?.content ? contentOf(match.content) : null;
+    const partner = model.partner(selection);
+    const a = model.run.pictures[selection.frame];
+    const b = partner === null ? undefined : model.run.pictures[partner];
+    const contentA = a?.content ? contentOf(a.content) : null;
+    const contentB = b?.content ? contentOf(b.content) : null;
     this.element.replaceChildren(
-      this.maps("query", query, queryContent, "A"),
-      this.maps("match", match, matchContent, "B"),
+      this.maps(`query ${selection.frame}`, a, contentA, "A"),
+      this.maps(partnerName(model, selection), b, contentB, "B"),
     );
-    if (queryContent && matchContent) {
-      this.element.append(this.and(queryContent, matchContent, model.shiftTolerance));
+    if (contentA && contentB) {
+      this.element.append(this.and(contentA, contentB, model.shiftTolerance));
     }
   }
 
@@ -45,12 +48,12 @@ export class PairContents {
     const saliency = picture?.saliency
       ? html("img", {
           class: "map",
-          alt: `saliency of the ${whose}`,
+          alt: `saliency of ${whose}`,
           src: `data:image/png;base64,${picture.saliency}`,
         })
       : null;
     const bits = content
-      ? this.map(`binary content of the ${whose}`, (i, { ink }) => (content[i] ? ink : null))
+      ? this.map(`binary content of ${whose}`, (i, { ink }) => (content[i] ? ink : null))
       : null;
     return html(
       "div",

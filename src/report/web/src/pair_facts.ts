@@ -3,20 +3,23 @@
 
 import { type Child, html } from "./dom.ts";
 import * as format from "./format.ts";
+import { candidateName } from "./partner.ts";
 import type { RunModel } from "./run_model.ts";
 import { meaningOfLoop, meaningOfStatus, nameOfStatus } from "./status_text.ts";
+import type { Selection } from "./store.ts";
 import { markIcon, nameOf } from "./verdicts.ts";
 
 function fact(name: string, key: string, ...value: Child[]): HTMLElement {
   return html("div", {}, html("dt", {}, name), html("dd", { "data-key": `pair.${key}` }, ...value));
 }
 
-/** What was decided about the frame, and on what numbers. */
-export function pairFacts(model: RunModel, frame: number): HTMLElement[] {
+/** What was decided about the frame, and on what numbers: those with its best candidate. */
+export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] {
   const { run } = model;
+  const { frame } = selection;
   const status = model.status(frame);
   const mark = model.mark(frame);
-  const time = run.timestamp_s?.[frame];
+  const time = run.timestamp_s?.[frame] ?? null;
   const line = html(
     "p",
     { class: `verdict ${mark ?? "none"}`, "data-key": "pair.verdict" },
@@ -28,8 +31,9 @@ export function pairFacts(model: RunModel, frame: number): HTMLElement[] {
     "p",
     { class: "why" },
     mark && status !== "loop" ? `${nameOfStatus(status)}: ` : null,
-    model.isLoop(frame) ? meaningOfLoop(model.verdict(frame)) : meaningOfStatus(status),
+    model.isLoop(frame) ? meaningOfLoop(model.verdict(frame)) : meaningOfStatus(model, status),
   );
+  const score = model.score(frame);
   const threshold = run.threshold;
   const limit =
     threshold === null
@@ -37,15 +41,15 @@ export function pairFacts(model: RunModel, frame: number): HTMLElement[] {
       : html(
           "span",
           { class: "small" },
-          ` ${model.score(frame) >= threshold ? "≥" : "<"} ${format.score(threshold)}`,
+          ` ${(score ?? 0) >= threshold ? "≥" : "<"} ${format.score(threshold)}`,
         );
-  const has = model.match(frame) !== null;
+  const has = model.matchName(frame) !== null;
   const number = (column: number[] | null) =>
     column && has ? format.count(column[frame] ?? 0) : "–";
   const facts = html(
     "dl",
     { class: "facts" },
-    fact("score", "score", has ? format.score(model.score(frame)) : "–", has ? limit : null),
+    fact("score", "score", has ? format.score(score) : "–", has ? limit : null),
     fact(
       "similarity ξ",
       "similarity",
@@ -54,10 +58,18 @@ export function pairFacts(model: RunModel, frame: number): HTMLElement[] {
     fact("matches", "matches", number(run.matches)),
     fact("inliers", "inliers", number(run.inliers)),
   );
-  if (time !== undefined && time !== null)
-    facts.append(fact("time", "time", format.timestamp(time)));
+  if (time !== null) {
+    const since = html(
+      "span",
+      { title: `since the first frame; timestamp ${format.timestamp(time)}` },
+      format.timestamp(time - model.firstTime()),
+    );
+    facts.append(fact("time", "time", since));
+  }
   if (model.totals_ms && model.isReadable(frame)) {
     facts.append(fact("took", "took", `${format.milliseconds(model.totals_ms[frame] ?? 0)} ms`));
   }
-  return [line, why, facts];
+  if (model.isWithCandidate(selection) || !has) return [line, why, facts];
+  const whose = `With its ${candidateName(model, frame)}, which is not shown:`;
+  return [line, why, html("p", { class: "whose", "data-key": "pair.whose" }, whose), facts];
 }

@@ -3,7 +3,9 @@
 
 import { bytesOf } from "./content.ts";
 import { html, svg } from "./dom.ts";
+import { absenceOf, partnerAbsence, partnerName } from "./partner.ts";
 import type { RunModel } from "./run_model.ts";
+import type { Selection } from "./store.ts";
 
 /** Between the two pictures, as a share of the width of one. */
 const kGap = 0.02;
@@ -14,29 +16,34 @@ const kCrowd = 120;
 /** Radius of an inlier, as a share of the width of a picture. */
 const kDot = 0.009;
 
-/** Query and match side by side, and the inlier matches as lines from one to the other. */
+/** Query and partner side by side, and the inlier matches as lines from one to the other. */
 export class PairPictures {
   readonly element = html("div", { class: "pictures", role: "img" });
   private shown = 0;
 
-  async show(model: RunModel, frame: number, partner: number | null, withLines: boolean) {
+  async show(model: RunModel, selection: Selection, withLines: boolean) {
     const turn = ++this.shown;
-    const [query, match] = await Promise.all([load(model, frame), load(model, partner)]);
+    const { frame } = selection;
+    const [query, partner] = await Promise.all([
+      load(model, frame),
+      load(model, model.partner(selection)),
+    ]);
     if (turn !== this.shown) return;
-    const aspect = aspectOf(query) ?? aspectOf(match) ?? 0.75;
+    const aspect = aspectOf(query) ?? aspectOf(partner) ?? 0.75;
     const isStacked = 1 / aspect > kWide;
     this.element.classList.toggle("stacked", isStacked);
-    const inliers = withLines ? inliersOf(model, frame) : new Float32Array();
-    const partnerName = partner === null ? "no candidate" : `frame ${partner}`;
+    const isDrawn = withLines && model.isWithCandidate(selection) && query && partner;
+    const inliers = isDrawn ? inliersOf(model, frame) : new Float32Array();
+    const name = partnerName(model, selection);
     this.element.setAttribute(
       "aria-label",
-      `Frame ${frame} and ${partnerName}, ${inliers.length / 4} inlier matches drawn.`,
+      `Query ${frame} and ${name}, ${inliers.length / 4} inlier matches drawn.`,
     );
     this.element.replaceChildren(
-      framed(query, aspect, model, frame, `query ${frame}`),
-      framed(match, aspect, model, partner, partner === null ? "no candidate" : `match ${partner}`),
+      framed(query, aspect, `query ${frame}`, absenceOf(model, frame)),
+      framed(partner, aspect, name, partnerAbsence(model, selection)),
     );
-    if (query && match && inliers.length > 0) {
+    if (inliers.length > 0) {
       const mark = model.mark(frame) ?? "none";
       this.element.append(linesOf(inliers, aspect, isStacked, mark));
     }
@@ -73,27 +80,14 @@ function inliersOf(model: RunModel, frame: number): Float32Array {
 function framed(
   image: HTMLImageElement | null,
   aspect: number,
-  model: RunModel,
-  frame: number | null,
   tag: string,
+  absence: string,
 ): HTMLElement {
   const box = html("div", { class: "picture" });
   box.style.aspectRatio = `${1 / aspect}`;
-  box.append(image ?? html("p", { class: "absent" }, reasonOf(model, frame)));
+  box.append(image ?? html("p", { class: "absent" }, absence));
   box.append(html("span", { class: "tag" }, tag));
   return box;
-}
-
-/** Why there is no picture, and what brings it. */
-function reasonOf(model: RunModel, frame: number | null): string {
-  if (frame === null) return "No earlier frame came into question.";
-  if (!model.isReadable(frame)) return "This image could not be read.";
-  if (Object.keys(model.run.pictures).length === 0) {
-    return model.run.record
-      ? "No pictures were kept with this run, or --pictures-mb left no room for one."
-      : "There are no pictures: they come with runs of loopbit.";
-  }
-  return "Left out to keep the page small; --pictures-mb N makes room for more.";
 }
 
 function linesOf(

@@ -3,7 +3,7 @@
 
 import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
-import { type Bounds, middle, panned, withEqualAxes, zoomed } from "./bounds.ts";
+import { type Bounds, middle, panned, shows, withEqualAxes, zoomed } from "./bounds.ts";
 import { button, html, svg } from "./dom.ts";
 import { axesOf } from "./plot_axes.ts";
 import { kZoomStep, listenToPlot, type PlotInput } from "./plot_input.ts";
@@ -36,7 +36,7 @@ export class Plot implements PlotInput {
   private hovered: Hit | null = null;
 
   constructor(private readonly spec: PlotSpec) {
-    const keys = spec.zoom === "none" ? "" : " Keys + and - zoom, 0 shows all.";
+    const keys = spec.zoom === "none" ? "" : " Keys + and - zoom about the frame, 0 shows all.";
     this.element = html("div", {
       class: `plot${spec.zoom === "none" ? "" : " zoomable"}`,
       role: "group",
@@ -76,11 +76,12 @@ export class Plot implements PlotInput {
   /** Other data: everything is shown again. */
   reset(): void {
     this.home = this.spec.bounds();
+    this.show(this.home);
     const plot = this.plot;
-    if (plot && this.spec.equalAxes) {
-      const { width, height } = this.area(plot);
-      this.home = withEqualAxes(this.home, width, height);
-    }
+    if (!plot || !this.spec.equalAxes) return;
+    // Only now the labels have their room.
+    const { width, height } = this.area(plot);
+    this.home = withEqualAxes(this.home, width, height);
     this.show(this.home);
   }
 
@@ -112,6 +113,17 @@ export class Plot implements PlotInput {
     this.overlay.replaceChildren(...this.spec.selected(to), ...this.hoverMarks(to));
   }
 
+  /** Another frame is selected: it is marked, and the view moved to where it is. */
+  follow(): void {
+    const place = this.spec.place?.();
+    if (!this.plot || !place || shows(this.view, this.spec.zoom, place)) {
+      this.mark();
+      return;
+    }
+    const { x, y } = middle(this.view);
+    this.show(panned(this.view, this.home, this.spec.zoom, place.x - x, place.y - y));
+  }
+
   resize(): void {
     const width = Math.floor(this.element.clientWidth);
     if (width < 40) return;
@@ -127,17 +139,18 @@ export class Plot implements PlotInput {
 
   private make(size: { width: number; height: number }): uPlot {
     const range = (axis: "x" | "y") => (): uPlot.Range.MinMax => [...this.view[axis]];
+    const { axes, overhang } = axesOf(this.spec);
     const plot = new uPlot(
       {
         ...size,
-        padding: [10, 14, 2, 2],
+        padding: [10, overhang, 2, 2],
         legend: { show: false },
         cursor: { show: false },
         scales: {
           x: { time: false, range: range("x") },
           y: { range: range("y"), dir: this.spec.yDown ? -1 : 1 },
         },
-        axes: axesOf(this.spec),
+        axes,
         series: [{}, { paths: () => null, points: { show: false } }],
         hooks: { draw: [(drawn) => this.draw(drawn)] },
       },
@@ -154,10 +167,20 @@ export class Plot implements PlotInput {
 
   zoom(factor: number, event?: MouseEvent): void {
     if (!this.plot) return;
-    const pixel = event && this.pixel(event);
-    const to = this.projection(this.plot);
-    const about = pixel ? { x: to.atX(pixel.x), y: to.atY(pixel.y) } : middle(this.view);
+    const about = event ? this.placeAt(event, this.plot) : this.centre();
     this.show(zoomed(this.view, this.home, this.spec.zoom, factor, about));
+  }
+
+  private placeAt(event: MouseEvent, plot: uPlot): { x: number; y: number } {
+    const pixel = this.pixel(event);
+    const to = this.projection(plot);
+    return { x: to.atX(pixel.x), y: to.atY(pixel.y) };
+  }
+
+  /** What is selected, if it is in view. */
+  private centre(): { x: number; y: number } {
+    const place = this.spec.place?.();
+    return place && shows(this.view, this.spec.zoom, place) ? place : middle(this.view);
   }
 
   pan(from: Bounds, dx: number, dy: number): void {

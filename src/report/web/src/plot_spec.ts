@@ -35,5 +35,7 @@ export interface PlotSpec {
   hit(pixel: { x: number; y: number }, to: Projection): Hit | null;
   /** Marks what is selected, in CSS pixels of the plotting area. */
   selected(to: Projection): SVGElement[];
+  /** Where what is selected is, if it is anywhere: keys zoom about it, and the view follows it. */
+  place?(): { x: number; y: number } | null;
   select(hit: Hit): void;
 }

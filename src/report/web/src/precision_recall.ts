@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 
 import { html, svg } from "./dom.ts";
+import { curveOf, figuresOf } from "./figures.ts";
 import * as format from "./format.ts";
 import { Plot } from "./plot.ts";
 import type { Hit } from "./plot_spec.ts";
@@ -14,6 +15,9 @@ import type { Theme } from "./theme.ts";
 import type { Point } from "./verdicts.ts";
 import { caption, section, type View } from "./view.ts";
 
+const kCaption =
+  "Each point is what would be found, and how much of it true, if every frame with at least that score were a loop; the large dot is the detector as shipped, the bar the most it finds without a wrong loop.";
+
 const at = ({ recall, precision }: { recall: number; precision: number }): Point => ({
   x: recall,
   y: precision,
@@ -25,6 +29,7 @@ export class PrecisionRecall implements View {
   private readonly caption = caption();
   private readonly key = html("ul", { class: "legend" });
   private readonly plot: Plot;
+  private readonly controls: HTMLElement;
 
   constructor(
     private readonly store: Store,
@@ -40,29 +45,30 @@ export class PrecisionRecall implements View {
       draw: (ctx, to, theme) => this.draw(ctx, to, theme),
       hit: (pixel, to) => this.hitAt(pixel, to),
       selected: (to) => this.selected(to),
+      place: () => this.place(),
       select: (hit) => this.store.select(hit.frame),
     });
+    this.controls = this.plot.controls();
     this.element = section(
       "precision-recall",
       "Precision and recall",
       this.caption,
-      this.plot.controls(),
+      this.controls,
       this.key,
       this.plot.element,
     );
   }
 
   showRun(model: RunModel): void {
-    this.caption.textContent =
-      "Each point is what would be found, and how much of it true, if every frame with at least that score were a loop; the large dot is the detector as shipped, the bar the most it finds without a wrong loop.";
+    this.caption.textContent = captionOf(model);
     const { evaluation } = model.run;
     const entries: HTMLElement[] = [];
     this.models.forEach((other, i) => {
       if (!other.run.evaluation || this.models.length < 2) return;
       entries.push(html("li", {}, lineOf(i, other === model), other.run.name));
     });
-    if (evaluation) {
-      const { recall, precision, recall_at_full_precision: full } = evaluation;
+    if (evaluation && curveOf(evaluation).length > 0) {
+      const { recall, precision, recallAtFullPrecision: full } = figuresOf(evaluation);
       entries.push(
         html(
           "li",
@@ -73,11 +79,14 @@ export class PrecisionRecall implements View {
       );
     }
     this.key.replaceChildren(...entries);
+    const isBlank = this.models.every((other) => curveOf(other.run.evaluation).length === 0);
+    this.plot.element.hidden = isBlank;
+    this.controls.hidden = isBlank;
     this.plot.reset();
   }
 
   showSelection(_: Selection): void {
-    this.plot.mark();
+    this.plot.follow();
   }
 
   private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
@@ -99,7 +108,7 @@ export class PrecisionRecall implements View {
     const { evaluation } = model.run;
     if (!evaluation) return;
     const path = new Path2D();
-    evaluation.curve.forEach((point, i) => {
+    curveOf(evaluation).forEach((point, i) => {
       if (i === 0) path.moveTo(to.x(0), to.y(point.precision));
       path.lineTo(to.x(point.recall), to.y(point.precision));
     });
@@ -109,17 +118,14 @@ export class PrecisionRecall implements View {
     ctx.setLineDash(dashOf(index).map((length) => length * to.ratio));
     ctx.stroke(path);
     ctx.setLineDash([]);
-    const full = to.x(evaluation.recall_at_full_precision);
-    const bar = 7 * to.ratio;
-    ctx.strokeRect(full, to.y(1) - bar, 0, 2 * bar);
+    const { recall, precision, recallAtFullPrecision: full } = figuresOf(evaluation);
+    if (full !== null) {
+      const bar = 7 * to.ratio;
+      ctx.strokeRect(to.x(full), to.y(1) - bar, 0, 2 * bar);
+    }
+    if (recall === null || precision === null) return;
     ctx.beginPath();
-    ctx.arc(
-      to.x(evaluation.recall),
-      to.y(evaluation.precision),
-      (isSelected ? 5.5 : 4) * to.ratio,
-      0,
-      7,
-    );
+    ctx.arc(to.x(recall), to.y(precision), (isSelected ? 5.5 : 4) * to.ratio, 0, 7);
     ctx.fillStyle = isSelected ? theme.right : theme.muted;
     ctx.fill();
     ctx.lineWidth = 1.5 * to.ratio;
@@ -130,7 +136,7 @@ export class PrecisionRecall implements View {
   /** The frame whose score makes the point of the curve. */
   private hitAt(pixel: Point, to: Projection): Hit | null {
     const model = this.store.model;
-    const curve = model.run.evaluation?.curve ?? [];
+    const curve = curveOf(model.run.evaluation);
     const i = nearest(
       to,
       pixel,
@@ -151,16 +157,31 @@ export class PrecisionRecall implements View {
     return { frame, at: at(point), text };
   }
 
+  /** The point of the curve that the selected frame's score makes. */
+  private place(): Point | null {
+    const { store } = this;
+    const score = store.model.score(store.now.frame);
+    const point = curveOf(store.model.run.evaluation).find((other) => other.score === score);
+    return point ? at(point) : null;
+  }
+
   private selected(to: Projection): SVGElement[] {
     const { frame } = this.store.now;
-    const score = this.store.model.score(frame);
-    const point = this.store.model.run.evaluation?.curve.find((other) => other.score === score);
-    if (!point) return [];
-    const { x, y } = at(point);
-    return [
-      svg("circle", { class: "selected", cx: to.x(x), cy: to.y(y), r: 9, "data-frame": frame }),
-    ];
+    const place = this.place();
+    if (!place) return [];
+    const ring = { cx: to.x(place.x), cy: to.y(place.y), r: 9 };
+    return [svg("circle", { class: "selected", ...ring, "data-frame": frame })];
   }
+}
+
+function captionOf({ run }: RunModel): string {
+  if (!run.evaluation) return "There is no truth to judge this run by.";
+  if (run.evaluation.positives === 0) {
+    return "No place was visited twice: there is nothing to recall, and no curve.";
+  }
+  return curveOf(run.evaluation).length > 0
+    ? kCaption
+    : "No frame has a candidate that is right or wrong: there is no precision, and no curve.";
 }
 
 function atIndex(curve: readonly CurvePoint[], i: number): Point | null {

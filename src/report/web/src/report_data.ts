@@ -19,6 +19,7 @@ export type Verdict =
   | "wrong" // a loop, and false
   | "missed" // a revisit without a right loop: status tells why
   | "loop" // a loop, and no truth to judge it by
+  | "elsewhere" // a loop into an earlier session of the map, which truth does not speak of
   | "ignored"; // left out of the score
 
 /** Columns have one entry a frame. */
@@ -29,24 +30,33 @@ export interface Run {
   /** The score from which the detector accepts (decision.min_score). */
   threshold: number | null;
   frames: number;
+  /** Else there are at least so many: a detector lists no frames that it has nothing to say of. */
+  frames_known: boolean;
   timestamp_s: (number | null)[] | null;
   /** Names of statuses ("loop", "no_earlier_place", ...), and an index into them for each frame. */
   status_names: string[];
   status: number[];
-  /** The best candidate, accepted or not; -1 without one. */
+  /** The best candidate, accepted or not; -1 without one, or if it is in `earlier_match`. */
   match: number[];
-  score: number[];
+  /** The best candidates that are frames of earlier sessions of the map; null if none is. */
+  earlier_match: ([session: number, frame: number] | null)[] | null;
+  /** Null where the detector says nothing of a frame. */
+  score: (number | null)[];
   /** These are null where the detector does not report them. */
   similarity: number[] | null;
   matches: number[] | null;
   inliers: number[] | null;
   times_ms: StepTimes | null;
   verdict: Verdict[];
-  /** Flat triples query, first, last. */
-  truth: { same_place: number[]; near_place: number[] } | null;
+  /** Flat triples query, first, last; and where that is from, in words, if it is known. */
+  truth: { same_place: number[]; near_place: number[]; source: string | null } | null;
   evaluation: Evaluation | null;
-  /** Camera centres in the plane of the drive, m; null where not known. */
-  positions: { x_m: (number | null)[]; y_m: (number | null)[] } | null;
+  /** Camera centres in the plane of the world in which they reach furthest, m; null where not known. */
+  positions: {
+    x_m: (number | null)[];
+    y_m: (number | null)[];
+    axes: [x: string, y: string];
+  } | null;
   similarity_matrix: SimilarityMatrix | null;
   /** By frame number. Not every frame has one: the report has a size budget. */
   pictures: Record<string, Picture>;
@@ -66,19 +76,23 @@ export interface TimeSummary {
   max: number;
 }
 
-/** See docs/run_folder.md. */
+/** See docs/run_folder.md. A run that did not end has no results. */
 export interface RunRecord {
   loopbit: string;
+  /** What followed the name of the command; none if a library made the run. */
+  arguments?: string[];
   input: { path: string; description: string; every: number; limit: number };
+  /** Where what was seen is kept, and which of its sessions this run is. */
+  map?: { path: string; session: number };
   stopped_by: string;
   options: Record<string, Record<string, number | boolean>>;
   machine: { processor: string; cores: number; kernel: string; system: string };
   threads: number;
-  counts: { frames: number; by_status: Record<string, number> };
-  times_ms: Record<keyof StepTimes, TimeSummary> & { total?: TimeSummary };
-  wall_s: number;
-  frames_per_s: number;
-  peak_memory_mib: number;
+  counts?: { frames: number; by_status: Record<string, number> };
+  times_ms?: Record<keyof StepTimes, TimeSummary> & { total?: TimeSummary };
+  wall_s?: number;
+  frames_per_s?: number;
+  peak_memory_mib?: number;
 }
 
 /** A point of the precision-recall curve: all queries with at least this score. */
@@ -110,10 +124,12 @@ export interface Evaluation {
   curve: CurvePoint[];
 }
 
-/** xi of every two frames, at most `side` cells a side: the largest of the frames in a cell. */
+/** xi of two frames each, at most `side` cells a side: the largest of those compared in a cell. */
 export interface SimilarityMatrix {
   side: number;
   frames_per_cell: number;
+  /** Every so-many-th frame was compared with every so-many-th, and each frame with its match. */
+  compared_every: number;
   /** base64 PNG, 8-bit grey, side x side, row = later frame, column = earlier; 255 = xi of 1. */
   png: string;
 }

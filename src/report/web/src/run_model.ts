@@ -5,7 +5,15 @@ import type { Run, TimeSummary, Verdict } from "./report_data.ts";
 import type { Against } from "./store.ts";
 import { isMarked, type Marked } from "./verdicts.ts";
 
-export const kFilters = ["all", "loops", "right", "wrong", "missed", "tolerated"] as const;
+export const kFilters = [
+  "all",
+  "loops",
+  "right",
+  "wrong",
+  "missed",
+  "tolerated",
+  "elsewhere",
+] as const;
 export type Filter = (typeof kFilters)[number];
 
 export type Step = "content" | "retrieval" | "features" | "verification";
@@ -15,6 +23,12 @@ export const kSteps: readonly Step[] = ["content", "retrieval", "features", "ver
 const kDefaultShiftTolerance = 4;
 
 type Span = readonly [first: number, last: number];
+
+/** A frame of an earlier session of the map. */
+export interface EarlierFrame {
+  session: number;
+  frame: number;
+}
 
 /** A run, and what follows from its columns. */
 export class RunModel {
@@ -51,18 +65,51 @@ export class RunModel {
     return this.status(frame) === "loop";
   }
 
+  /** Whether it is a loop with a frame of this run, which can be drawn. */
+  isLoopHere(frame: number): boolean {
+    return this.isLoop(frame) && this.match(frame) !== null;
+  }
+
   isReadable(frame: number): boolean {
     return this.status(frame) !== "unreadable";
   }
 
-  score(frame: number): number {
-    return this.run.score[frame] ?? 0;
+  /** Null where the detector says nothing of the frame. */
+  score(frame: number): number | null {
+    return this.run.score[frame] ?? null;
   }
 
-  /** The best candidate, accepted or not. */
+  /** Whether the detector says which frames it could not read. */
+  tellsUnreadable(): boolean {
+    return this.run.status_names.includes("unreadable");
+  }
+
+  unreadable(): number {
+    return this.where((frame) => !this.isReadable(frame)).length;
+  }
+
+  framesWithCandidate(): number {
+    return this.where((frame) => this.score(frame) !== null).length;
+  }
+
+  /** The best candidate, accepted or not, if it is a frame of this run. */
   match(frame: number): number | null {
     const match = this.run.match[frame] ?? -1;
     return match < 0 ? null : match;
+  }
+
+  /** The same, if it is a frame of an earlier session of the map. */
+  earlierMatch(frame: number): EarlierFrame | null {
+    const match = this.run.earlier_match?.[frame];
+    return match ? { session: match[0], frame: match[1] } : null;
+  }
+
+  /** The best candidate as loops.csv writes it: "17", or "1:17" for frame 17 of session 1. */
+  matchName(frame: number): string | null {
+    const earlier = this.earlierMatch(frame);
+    if (earlier) return `${earlier.session}:${earlier.frame}`;
+    const match = this.match(frame);
+    return match === null ? null : String(match);
   }
 
   trueSpans(frame: number): readonly Span[] {
@@ -75,10 +122,18 @@ export class RunModel {
     return span ? span[0] + Math.floor((span[1] - span[0]) / 2) : null;
   }
 
-  /** The frame that is shown beside the selected one. */
+  /** The frame of this run that is shown beside the selected one. */
   partner({ frame, against }: { frame: number; against: Against }): number | null {
     if (against === "match") return this.match(frame);
     return against === "truth" ? this.truePlace(frame) : against;
+  }
+
+  /** Whether what is shown beside the selected frame is its best candidate, or would be. */
+  isWithCandidate(selection: { frame: number; against: Against }): boolean {
+    const { frame, against } = selection;
+    if (against === "match") return true;
+    const match = this.match(frame);
+    return match !== null && match === this.partner(selection);
   }
 
   /** The frames that have this mark, in order. */
@@ -91,9 +146,12 @@ export class RunModel {
     return frames;
   }
 
-  /** Those of them that are loops: a missed frame may be one, too, but not with a true place. */
+  /**
+   * Those of them that are loops with a frame of this run: a missed frame may be one, too, but not
+   * with a true place.
+   */
   loopsMarked(verdict: Marked): readonly number[] {
-    return this.framesMarked(verdict).filter((frame) => this.isLoop(frame));
+    return this.framesMarked(verdict).filter((frame) => this.isLoopHere(frame));
   }
 
   /** The frames that pass a filter, in order. */
@@ -108,6 +166,16 @@ export class RunModel {
     return frames;
   }
 
+  /** The loops with a frame of another session. */
+  loopsElsewhere(): readonly number[] {
+    return this.framesIn("loops").filter((frame) => !this.isLoopHere(frame));
+  }
+
+  /** Seconds; of the first frame that has a time. */
+  firstTime(): number {
+    return this.run.timestamp_s?.find((time) => time !== null) ?? 0;
+  }
+
   get shiftTolerance(): number {
     const columns = this.run.record?.options["retrieval"]?.["shift_tolerance_columns"];
     return typeof columns === "number" ? columns : kDefaultShiftTolerance;
@@ -115,23 +183,22 @@ export class RunModel {
 
   /** As run.json has it, else from the columns; null where there are none. */
   totalTime(): TimeSummary | null {
-    return this.run.record?.times_ms.total ?? (this.totals_ms && this.summary(this.totals_ms));
+    return this.run.record?.times_ms?.total ?? (this.totals_ms && this.summary(this.totals_ms));
   }
 
   stepTime(step: Step): TimeSummary | null {
-    if (this.run.record) return this.run.record.times_ms[step];
-    return this.run.times_ms && this.summary(this.run.times_ms[step]);
+    const times = this.run.times_ms?.[step];
+    return this.run.record?.times_ms?.[step] ?? (times ? this.summary(times) : null);
   }
 
   /** The frame to begin with: what went wrong, else the clearest loop. */
   firstFrame(): number {
     const wrong = this.framesIn("wrong")[0];
     if (wrong !== undefined) return wrong;
-    let best = -1;
-    for (const frame of this.framesIn("loops")) {
-      if (best < 0 || this.score(frame) > this.score(best)) best = frame;
-    }
-    return best >= 0 ? best : (this.framesIn("missed")[0] ?? 0);
+    const score = (frame: number) => this.score(frame) ?? Number.NEGATIVE_INFINITY;
+    const loops = this.framesIn("loops");
+    const first = loops[0] ?? this.framesIn("missed")[0] ?? 0;
+    return loops.reduce((best, frame) => (score(frame) > score(best) ? frame : best), first);
   }
 
   /** What the frame is marked as; an ignored frame only if it is a loop. */
@@ -148,10 +215,10 @@ export class RunModel {
     return frames;
   }
 
-  /** Over the readable frames, by the rule of run.json. */
+  /** Over the readable frames, by the rule of run.json: quantiles are nearest ranks. */
   private summary(times: readonly number[]): TimeSummary {
     const sorted = times.filter((_, frame) => this.isReadable(frame)).sort((a, b) => a - b);
-    const quantile = (q: number) => sorted[Math.floor(q * (sorted.length - 1))] ?? 0;
+    const quantile = (q: number) => sorted[Math.ceil(q * sorted.length) - 1] ?? 0;
     const mean = sorted.reduce((sum, time) => sum + time, 0) / Math.max(1, sorted.length);
     return { mean, p50: quantile(0.5), p99: quantile(0.99), max: quantile(1) };
   }

@@ -31,12 +31,13 @@ export class Score implements View {
       draw: (ctx, to, theme) => this.draw(ctx, to, theme),
       hit: (pixel, to) => {
         const frame = this.frameAt(pixel, to);
-        const model = this.store.model;
-        return frame === null
+        const at = frame === null ? null : this.place(frame);
+        return frame === null || !at
           ? null
-          : { frame, at: this.place(frame), text: frameText(model, frame) };
+          : { frame, at, text: frameText(this.store.model, frame) };
       },
       selected: (to) => this.selected(to),
+      place: () => this.place(this.store.now.frame) ?? { x: this.store.now.frame, y: 0 },
       select: (hit) => this.store.select(hit.frame),
     });
     this.element = section(
@@ -52,22 +53,28 @@ export class Score implements View {
     const { threshold } = model.run;
     this.caption.textContent =
       threshold === null
-        ? "The score of each frame's best candidate, as the detector gave it; its threshold is not known."
+        ? "The score of each frame's best candidate, as the detector gave it, where it gave one; its threshold is not known."
         : `The score of each frame's best candidate. From ${format.score(threshold)}, the dashed line, it is accepted.`;
     this.plot.reset();
   }
 
   showSelection(_: Selection): void {
-    this.plot.mark();
+    this.plot.follow();
   }
 
-  private place(frame: number): Point {
-    return { x: frame, y: this.store.model.score(frame) };
+  private place(frame: number): Point | null {
+    const score = this.store.model.score(frame);
+    return score === null ? null : { x: frame, y: score };
+  }
+
+  private pixel(frame: number, to: Projection): Point | null {
+    const place = this.place(frame);
+    return place && { x: to.x(place.x), y: to.y(place.y) };
   }
 
   private bounds(): Bounds {
     const { run, frames } = this.store.model;
-    const scores = run.score.filter(Number.isFinite);
+    const scores = run.score.filter((score) => score !== null).filter(Number.isFinite);
     const top = scores.reduce((a, b) => Math.max(a, b), 1.15 * (run.threshold ?? 0));
     const low = scores.reduce((a, b) => Math.min(a, b), 0);
     const air = (top - low || 1) * 0.07;
@@ -80,9 +87,7 @@ export class Score implements View {
     this.drawUnmarked(ctx, to, theme);
     const count = model.framesIn("loops").length + model.framesIn("missed").length;
     for (const verdict of kMarked) {
-      const points = model
-        .framesMarked(verdict)
-        .map((frame) => ({ x: to.x(frame), y: to.y(model.score(frame)) }));
+      const points = model.framesMarked(verdict).flatMap((frame) => this.pixel(frame, to) ?? []);
       drawMarks(ctx, verdict, points, (markRadius(count) - 0.5) * to.ratio, theme);
     }
     if (model.run.threshold !== null) this.drawThreshold(ctx, to, theme, model.run.threshold);
@@ -93,8 +98,8 @@ export class Score implements View {
     const size = (model.frames > 2000 ? 2 : 3) * to.ratio;
     ctx.fillStyle = theme.faint;
     for (let frame = 0; frame < model.frames; ++frame) {
-      if (model.mark(frame) !== null) continue;
-      ctx.fillRect(to.x(frame) - size / 2, to.y(model.score(frame)) - size / 2, size, size);
+      const at = model.mark(frame) === null ? this.pixel(frame, to) : null;
+      if (at) ctx.fillRect(at.x - size / 2, at.y - size / 2, size, size);
     }
   }
 
@@ -142,10 +147,15 @@ export class Score implements View {
   private selected(to: Projection): SVGElement[] {
     const { frame } = this.store.now;
     const x = to.x(frame);
-    const y = to.y(this.store.model.score(frame));
-    return [
+    const at = this.pixel(frame, to);
+    const marks: SVGElement[] = [
       svg("line", { class: "hair", x1: x, x2: x, y1: 0, y2: to.height }),
-      svg("circle", { class: "selected", cx: x, cy: y, r: 8, "data-frame": frame }),
     ];
+    if (at) {
+      marks.push(
+        svg("circle", { class: "selected", cx: at.x, cy: at.y, r: 8, "data-frame": frame }),
+      );
+    }
+    return marks;
   }
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 
 import type { Verdict } from "./report_data.ts";
+import type { RunModel } from "./run_model.ts";
 
 /** Why a frame has no loop, and what helps: the table of docs/run_folder.md in sentences. */
 const kMeanings: Record<string, string> = {
@@ -10,8 +11,6 @@ const kMeanings: Record<string, string> = {
   no_earlier_place: "Every place so far is recent: this is the start of a drive.",
   no_similar_place:
     "No earlier place looks alike (ξ below retrieval.min_similarity); the picture may be blank or dark.",
-  few_matches:
-    "There are candidates, but none shares 8 features: a new place, or blur, or another direction of view.",
   no_geometry:
     "Features match, but not as one rigid scene: look-alike texture, or things that move.",
   low_score:
@@ -27,10 +26,19 @@ const kJudged: Partial<Record<Verdict, string>> = {
   tolerated: "The match is accepted; truth counts it neither as right nor as wrong.",
   missed: "The match is accepted and not wrong, but it is no true place of this frame.",
   ignored: "The match is accepted; truth leaves this frame out of the score.",
+  elsewhere:
+    "The match is accepted; it is a place of an earlier session of the map, which truth does not judge.",
 };
 
 /** What became of a loop, as far as truth can tell. */
 export const meaningOfLoop = (verdict: Verdict): string =>
   kJudged[verdict] ?? kMeanings["loop"] ?? "";
-export const meaningOfStatus = (status: string): string => kMeanings[status] ?? "";
+
+export function meaningOfStatus(model: RunModel, status: string): string {
+  if (status !== "few_matches") return kMeanings[status] ?? "";
+  const needed = model.run.record?.options["verification"]?.["min_matches"];
+  const few = needed === undefined ? "enough features" : `${needed} features`;
+  return `There are candidates, but none shares ${few}: a new place, or blur, or another direction of view.`;
+}
+
 export const nameOfStatus = (status: string): string => status.replaceAll("_", " ");

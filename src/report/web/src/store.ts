@@ -93,8 +93,9 @@ export class Store {
     const run = this.models[wanted.run] ? wanted.run : 0;
     const frames = this.models[run]?.frames ?? 0;
     const frame = Math.min(Math.max(0, wanted.frame), Math.max(0, frames - 1));
+    const isMatch = wanted.against === this.models[run]?.match(frame);
     const isFrame = typeof wanted.against !== "number" || wanted.against < frames;
-    return { ...wanted, run, frame, against: isFrame ? wanted.against : "match" };
+    return { ...wanted, run, frame, against: isFrame && !isMatch ? wanted.against : "match" };
   }
 
   private fromAddress(): Selection {

@@ -14,18 +14,34 @@ import type { View } from "./view.ts";
 export function sentenceOf(model: RunModel): string {
   const { evaluation } = model.run;
   const loops = model.framesIn("loops").length;
-  const frames = format.counted(model.frames, "frame");
+  const elsewhere = model.loopsElsewhere().length;
+  const frames = model.run.frames_known ? ` in ${format.counted(model.frames, "frame")}` : "";
   if (!evaluation) {
     const unknown = loops > 0 ? "judge them by" : "say whether one was missed";
-    return `${capital(format.counted(loops, "loop"))} found in ${frames}; there is no truth to ${unknown}.`;
+    const where =
+      elsewhere > 0
+        ? `, ${elsewhere === loops ? "all" : `${format.count(elsewhere)} of them`} into earlier sessions of the map`
+        : "";
+    return `${capital(format.counted(loops, "loop"))} found${frames}${where}; there is no truth to ${unknown}.`;
   }
   const { right, positives, wrong, tolerated } = evaluation;
   const found =
     positives === 0
       ? "No place was visited twice"
       : `${format.count(right)} of ${format.counted(positives, "revisit")} found`;
-  const also = tolerated > 0 ? `, ${format.count(tolerated)} tolerated` : "";
-  return `${found}, ${format.counted(wrong, "wrong loop")}${also}.`;
+  const also = tolerated > 0 ? `, ${toleratedOf(model, tolerated)}` : "";
+  const apart =
+    elsewhere > 0
+      ? `; ${format.counted(elsewhere, "loop")} into earlier sessions of the map, not judged`
+      : "";
+  return `${found}, ${format.counted(wrong, "wrong loop")}${also}${apart}.`;
+}
+
+/** A tolerated loop does not find a revisit, which is marked as missed. */
+function toleratedOf(model: RunModel, tolerated: number): string {
+  const missed = model.loopsMarked("missed").length;
+  const at = missed === 0 ? "" : ` (${format.count(missed)} of them at missed revisits)`;
+  return `${format.count(tolerated)} tolerated${at}`;
 }
 
 const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
@@ -79,6 +95,9 @@ export class Summary implements View {
 
 function noticeOf({ record, times_ms: times }: Run): string {
   if (record) {
+    if (record.stopped_by === "running") {
+      return "The run has not ended, or was killed; this is what it had found when the page was written.";
+    }
     if (record.stopped_by === "end") return "";
     return record.stopped_by === "interrupt"
       ? "The run was interrupted; this is what it found until then."
@@ -89,8 +108,9 @@ function noticeOf({ record, times_ms: times }: Run): string {
     : "";
 }
 
-function originOf({ record, evaluation }: Run): HTMLElement[] {
+function originOf({ record, evaluation, truth }: Run): HTMLElement[] {
   const parts: string[] = [];
+  if (record?.map) parts.push(`map ${record.map.path}, session ${record.map.session}`);
   if (record) {
     const { machine } = record;
     parts.push(
@@ -99,6 +119,7 @@ function originOf({ record, evaluation }: Run): HTMLElement[] {
       format.counted(record.threads, "thread"),
     );
   }
-  if (evaluation) parts.push(`protocol: ${evaluation.protocol ?? "truth as listed in its file"}`);
+  if (evaluation?.protocol) parts.push(`protocol: ${evaluation.protocol}`);
+  if (truth) parts.push(`truth: ${truth.source || "as it was given"}`);
   return parts.map((part) => html("span", {}, part));
 }

@@ -13,6 +13,7 @@ const kNames = [
   "missed",
   "tolerated",
   "loop",
+  "elsewhere",
   "ignored",
   "path",
   "step-content",

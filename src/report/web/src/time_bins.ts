@@ -13,7 +13,7 @@ export interface TimeBin {
 }
 
 /** The slowest frames would squeeze all others: what is beyond is counted in the last bin. */
-const kBeyondP99 = 1.3;
+const kBeyond = 1.3;
 
 function finished(model: RunModel, bin: { from: number; to: number; frames: number[] }): TimeBin {
   const mean_ms: Record<Step, number> = { content: 0, retrieval: 0, features: 0, verification: 0 };
@@ -30,7 +30,8 @@ function finished(model: RunModel, bin: { from: number; to: number; frames: numb
 export function binsByTime(model: RunModel, count: number): TimeBin[] {
   const summary = model.totalTime();
   if (!summary || !model.totals_ms) return [];
-  const end = Math.min(summary.max, summary.p99 * kBeyondP99) * 1.0001 || 1;
+  const { mean, p99, max } = summary;
+  const end = Math.min(max, kBeyond * Math.max(p99, mean)) * 1.0001 || 1;
   const width = end / count;
   const bins = Array.from({ length: count }, (_, i) => ({
     from: i * width,

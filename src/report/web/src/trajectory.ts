@@ -19,7 +19,7 @@ const kMarkedFirst_px = -6;
 const kCurveSteps = 10;
 const kManyLoops = 1500;
 
-/** The drive from above with its loops; without positions the frames on a ring. */
+/** The drive with its loops; without positions the frames on a ring. */
 export class Trajectory implements View {
   readonly element: HTMLElement;
   private readonly caption = caption();
@@ -47,6 +47,7 @@ export class Trajectory implements View {
           : { frame, at, text: frameText(this.store.model, frame) };
       },
       selected: (to) => this.selected(to),
+      place: () => this.places[this.store.now.frame] ?? null,
       select: (hit) => this.store.select(hit.frame),
     });
     this.element = section(
@@ -68,16 +69,21 @@ export class Trajectory implements View {
           return x === null || y === null ? null : { x, y };
         })
       : ringOf(frames);
-    this.caption.textContent = this.isRing
-      ? "The frames in order around a ring, clockwise from the top, with a line from each query to its match. --poses FILE shows the drive as it was."
-      : "The drive from above, in metres, with a line from each query to its match. Click a frame to see its pair.";
+    this.caption.textContent = positions
+      ? `The drive in metres, in the plane in which it reaches furthest (${positions.axes.join(" and ")} of its positions), with a line from each query to its match. Click a frame to see its pair.`
+      : "The frames in order around a ring, clockwise from the top, with a line from each query to its match. --poses FILE shows the drive as it was.";
+    if (model.loopsElsewhere().length > 0) {
+      this.caption.append(
+        " A loop into another session has no line: its match is none of these frames.",
+      );
+    }
     this.element.classList.toggle("ring", this.isRing);
     this.legend.show(model);
     this.plot.reset();
   }
 
   showSelection(_: Selection): void {
-    this.plot.mark();
+    this.plot.follow();
   }
 
   private bounds(): Bounds {

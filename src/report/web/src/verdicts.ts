@@ -38,6 +38,12 @@ const kMarks: Record<Marked, Mark> = {
     path: "M-0.75,-0.75H0.75V0.75H-0.75Z",
     style: "filled",
   },
+  elsewhere: {
+    name: "elsewhere",
+    meaning: "a loop into an earlier session of the map, which truth does not judge",
+    path: "M-0.75,-0.75H0.75V0.75H-0.75Z",
+    style: "hollow",
+  },
   missed: {
     name: "missed",
     meaning: "a revisit without a right loop",
@@ -56,6 +62,7 @@ const kMarks: Record<Marked, Mark> = {
 export const kMarked: readonly Marked[] = [
   "ignored",
   "tolerated",
+  "elsewhere",
   "loop",
   "right",
   "missed",
