@@ -22,8 +22,12 @@ const overprinted = () => {
   );
 };
 
-/** Names of runs may be long: the bars still have room, and the table on paper its numbers. */
+/** Names of runs may be long: the bars still have room, and the table all of its columns. */
 async function checkLongNames(page) {
+  const over = await page.$$eval(".scroll", (all) =>
+    all.map((table) => table.scrollWidth - table.clientWidth),
+  );
+  for (const px of over) assert.ok(px <= 0, `${px} px of a table are not to be seen`);
   const bars = await page.$$eval("#times .bar", (all) => all.map((bar) => bar.clientWidth));
   for (const width of bars) assert.ok(width >= 120, `a bar of ${width} px`);
 }

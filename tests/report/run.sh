@@ -9,13 +9,17 @@ here=$(dirname "$(readlink -f "$0")")
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
-world=(--frames 150 --world laps=2 --world spacing_m=1.5 --world width_px=320 --world height_px=240)
+town=(--world spacing_m=1.5 --world width_px=320 --world height_px=240)
+world=(--frames 150 --world laps=2 "${town[@]}")
 "$loopbit" demo "${world[@]}" --out "$scratch/demo"
 "$loopbit" demo "${world[@]}" --set decision.min_score=60 --out "$scratch/strict"
+"$loopbit" demo --frames 75 --world laps=1 "${town[@]}" --map "$scratch/town.db" --out "$scratch/first"
+"$loopbit" demo "${world[@]}" --map "$scratch/town.db" --out "$scratch/second"
 printf 'query,match,score\n120,45,0.9\n121,10,0.7\n' >"$scratch/other.csv"
 "$loopbit" compare "$scratch/demo" "$scratch/strict" "other=$scratch/other.csv" \
   --out "$scratch/compared.html"
 
 node "$here/report_test.mjs" --playwright "$web/node_modules" --page "$web/dist/report.html" \
   --report "$scratch/demo/report.html" --run-json "$scratch/demo/run.json" \
+  --report "$scratch/second/report.html" --run-json "$scratch/second/run.json" \
   --report "$scratch/compared.html"

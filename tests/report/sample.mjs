@@ -81,7 +81,7 @@ function detect(places, quality, options, next) {
     const isUnreadable = options.unreadable && frame % 37 === 5;
     const isEarly = frame < Math.max(2, frames / 20);
     const isRevisit = places[frame].along_m > lap_m && !options.noLoops;
-    const jitter = Math.round((next() - 0.5) * 0.012 * frames);
+    const jitter = Math.round((next() - 0.5) * 0.022 * frames);
     const isAstray = !isRevisit || next() > 0.93 + 0.06 * quality;
     const anywhere = Math.floor(next() * Math.max(1, frame - frames / 20));
     const match = isAstray ? anywhere : Math.max(0, Math.min(frame - 1, frame - lap + jitter));

@@ -7,7 +7,7 @@ import * as format from "./format.ts";
 import type { Evaluation, RunRecord } from "./report_data.ts";
 import type { RunModel } from "./run_model.ts";
 
-const kNoRevisits = "no revisits";
+const kNoRevisits = "no revisits scored";
 
 /** Its frames are drawn, not decoded. */
 const isBuiltInWorld = ({ input }: RunRecord) => input.description.startsWith("built-in world");
@@ -59,7 +59,7 @@ function judged(e: Evaluation): HTMLElement[] {
       "pairs.recall",
       format.share(figures.pairRecall),
       figures.pairRecall === null
-        ? "no true pairs"
+        ? "no true pairs scored"
         : `${format.count(e.pairs.right)} of ${format.counted(e.pairs.positives, "pair")}`,
     ),
   ];

@@ -177,7 +177,7 @@ export class PrecisionRecall implements View {
 function captionOf({ run }: RunModel): string {
   if (!run.evaluation) return "There is no truth to judge this run by.";
   if (run.evaluation.positives === 0) {
-    return "No place was visited twice: there is nothing to recall, and no curve.";
+    return "No revisit is scored: there is nothing to recall, and no curve.";
   }
   return curveOf(run.evaluation).length > 0
     ? kCaption

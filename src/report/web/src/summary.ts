@@ -27,7 +27,7 @@ export function sentenceOf(model: RunModel): string {
   const { right, positives, wrong, tolerated } = evaluation;
   const found =
     positives === 0
-      ? "No place was visited twice"
+      ? noRevisits(model)
       : `${format.count(right)} of ${format.counted(positives, "revisit")} found`;
   const also = tolerated > 0 ? `, ${toleratedOf(model, tolerated)}` : "";
   const apart =
@@ -36,6 +36,10 @@ export function sentenceOf(model: RunModel): string {
       : "";
   return `${found}, ${format.counted(wrong, "wrong loop")}${also}${apart}.`;
 }
+
+/** Those that truth lists may all be left out of the score. */
+const noRevisits = ({ run }: RunModel) =>
+  (run.truth?.same_place.length ?? 0) > 0 ? "No revisit is scored" : "No place was visited twice";
 
 /** A tolerated loop does not find a revisit, which is marked as missed. */
 function toleratedOf(model: RunModel, tolerated: number): string {
