@@ -71,5 +71,5 @@ export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] 
   }
   if (model.isWithCandidate(selection) || !has) return [line, why, facts];
   const whose = `With its ${candidateName(model, frame)}, which is not shown:`;
-  return [line, why, html("p", { class: "whose", "data-key": "pair.whose" }, whose), facts];
+  return [html("p", { class: "whose", "data-key": "pair.whose" }, whose), line, why, facts];
 }
