@@ -166,56 +166,16 @@ void bind_truth(py::module_& module) {
       .value("poses", TruthKind::poses, "where the camera stood");
 }
 
-bool has_times(const std::vector<CameraPose>& poses) {
-  return poses.front().timestamp_s.has_value();
-}
-
-/// The rows of the frames read, where row and frame go together by number. Throws Error (kind
-/// input) if they are too few.
-Positions rows_read(const std::vector<CameraPose>& poses, const std::string& path,
-                    std::size_t frames, std::size_t every) {
-  if (frames > 0 && (frames - 1) * every >= poses.size()) {
-    throw Error(ErrorKind::input,
-                fmt::format("'{}' has {} poses, but the sequence has {} frames: give a pose for "
-                            "each, or leave it out.",
-                            path, poses.size(), (frames - 1) * every + 1));
-  }
-  Positions positions_m;
-  for (std::size_t row = 0; positions_m.size() < frames; row += every) {
-    positions_m.emplace_back(poses[row].position_m);
-  }
-  return positions_m;
-}
-
 /// To be called with the GIL, which is free meanwhile.
-Positions positions_of_frames(const std::string& path, const Times& times_s, int every) {
-  const auto step = static_cast<std::size_t>(checked_every(every));
-  const py::gil_scoped_release release;
-  const std::vector<CameraPose> poses = read_poses(path);
-  const bool frames_have_times = std::any_of(times_s.begin(), times_s.end(),
-                                             [](const auto& time) { return time.has_value(); });
-  if (!has_times(poses) || !frames_have_times) {
-    return rows_read(poses, path, times_s.size(), step);
-  }
-  Positions positions_m;
-  positions_m.reserve(times_s.size());
-  for (const auto& pose : poses_of_frames(poses, times_s)) {
-    positions_m.push_back(pose ? std::optional(pose->position_m) : std::nullopt);
-  }
-  return positions_m;
-}
-
-/// Throws what the above would, as far as can be told before the frames are known.
-void check_poses(const Path& path, std::optional<std::size_t> frames, int every) {
-  const std::vector<CameraPose> poses = read_poses(path.string());
-  if (!frames || has_times(poses)) return;
-  (void)rows_read(poses, path.string(), *frames, static_cast<std::size_t>(every));
-}
-
-/// As positions_of_frames().
 std::vector<PlaceRun> place_runs_of(const std::string& path) {
   const py::gil_scoped_release release;
   return read_place_runs(path);
+}
+
+/// As place_runs_of().
+Positions read_without_gil(const std::string& path, const Times& times_s, int every) {
+  const py::gil_scoped_release release;
+  return read_positions(path, times_s, every);
 }
 
 void bind_poses(py::module_& module) {
@@ -224,15 +184,19 @@ void bind_poses(py::module_& module) {
   module.def(
       "read_positions",
       [](const Path& path, const Times& times_s, int every) {
-        return to_array(positions_of_frames(path.string(), times_s, every));
+        return to_array(read_without_gil(path.string(), times_s, every));
       },
       py::arg("path"), py::arg("times_s"), py::arg("every") = 1,
       "Camera centres by KITTI poses or a TUM trajectory, shape (n, 3), nan where not known: one "
-      "for "
-      "each time, None where a frame has none. Of the sequence's frames every so-many-th was read, "
+      "for each time, None where a frame has none. Of the sequence's frames every so-many-th was "
+      "read, "
       "at these times.");
-  module.def("_check_poses", &check_poses, py::arg("path"), py::arg("frames"), py::arg("every"),
-             Free());
+  module.def(
+      "_check_poses",
+      [](const Path& path, std::optional<std::size_t> frames, int every) {
+        check_poses(path.string(), frames, every);
+      },
+      py::arg("path"), py::arg("frames"), py::arg("every"), Free());
 }
 
 }  // namespace

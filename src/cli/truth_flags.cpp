@@ -29,28 +29,6 @@ const char* name_of(TruthKind kind) {
   return "";
 }
 
-bool has_times(const std::vector<CameraPose>& poses) {
-  return std::any_of(poses.begin(), poses.end(),
-                     [](const CameraPose& pose) { return pose.timestamp_s.has_value(); });
-}
-
-/// The rows of the frames that were read, where row and frame go together by number. Throws Error
-/// (kind input) if they are too few.
-std::vector<CameraPose> rows_read(const std::string& file, const std::vector<CameraPose>& poses,
-                                  std::size_t frames, int every) {
-  std::vector<CameraPose> rows;
-  rows.reserve(frames);
-  const auto step = static_cast<std::size_t>(every);
-  if (frames > 0 && (frames - 1) * step >= poses.size()) {
-    throw Error(ErrorKind::input,
-                fmt::format("'{}' has {} poses, but the sequence has {} frames: give a pose for "
-                            "each, or leave it out.",
-                            file, poses.size(), (frames - 1) * step + 1));
-  }
-  for (std::size_t row = 0; rows.size() < frames; row += step) rows.push_back(poses[row]);
-  return rows;
-}
-
 }  // namespace
 
 void TruthFlags::add_to(CLI::App& command) {
@@ -135,10 +113,7 @@ TruthOptions TruthFlags::truth_options(int every) const {
 void TruthFlags::check(int every, std::optional<std::size_t> frames) const {
   (void)evaluation();
   (void)truth_options(every);
-  if (const std::string file = poses_file(); !file.empty()) {
-    const std::vector<CameraPose> rows = read_poses(file);
-    if (!has_times(rows) && frames) (void)rows_read(file, rows, *frames, every);
-  }
+  if (const std::string file = poses_file(); !file.empty()) check_poses(file, frames, every);
   if (!given()) return;
   const TruthKind kind = truth_kind(truth);
   check_kind(kind);
@@ -214,24 +189,7 @@ std::string TruthFlags::poses_file() const {
 
 Positions TruthFlags::read_positions(const FrameTimes& times_s, int every) const {
   const std::string file = poses_file();
-  if (file.empty()) return {};
-  std::vector<CameraPose> rows = read_poses(file);
-  if (times_s.empty() && has_times(rows)) return {};
-  const auto has_time = [](const auto& time) { return time.has_value(); };
-  const bool by_time = has_times(rows) && std::any_of(times_s.begin(), times_s.end(), has_time);
-  if (!by_time) {
-    if (!times_s.empty()) rows = rows_read(file, rows, times_s.size(), every);
-    Positions positions;
-    positions.reserve(rows.size());
-    for (const CameraPose& row : rows) positions.emplace_back(row.position_m);
-    return positions;
-  }
-  Positions positions;
-  positions.reserve(times_s.size());
-  for (const auto& pose : poses_of_frames(rows, times_s)) {
-    positions.push_back(pose ? std::optional(pose->position_m) : std::nullopt);
-  }
-  return positions;
+  return file.empty() ? Positions{} : loopbit::read_positions(file, times_s, every);
 }
 
 std::string list_truth_settings() {

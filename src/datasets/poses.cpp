@@ -106,6 +106,31 @@ std::vector<std::optional<CameraPose>> poses_by_time(
   return found;
 }
 
+bool have_times(const std::vector<CameraPose>& poses) {
+  return poses.front().timestamp_s.has_value();
+}
+
+/// See read_positions().
+std::vector<std::optional<cv::Vec3d>> positions_by_row(const std::string& path,
+                                                       const std::vector<CameraPose>& poses,
+                                                       std::size_t frames, int every) {
+  if (every < 1) {
+    throw Error(ErrorKind::option,
+                fmt::format("every is {}, but must be 1 (all frames) or more.", every));
+  }
+  const auto step = static_cast<std::size_t>(every);
+  if (frames > 0 && (frames - 1) * step >= poses.size()) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' has {} poses, but the sequence has {} frames: give a pose for "
+                            "each, or leave it out.",
+                            path, poses.size(), (frames - 1) * step + 1));
+  }
+  std::vector<std::optional<cv::Vec3d>> positions_m;
+  positions_m.reserve(frames);
+  for (std::size_t k = 0; k < frames; ++k) positions_m.emplace_back(poses[k * step].position_m);
+  return positions_m;
+}
+
 }  // namespace
 
 std::vector<CameraPose> read_poses(const std::string& path) {
@@ -142,6 +167,29 @@ std::vector<std::optional<CameraPose>> poses_of_frames(
               fmt::format("There are {} poses but {} frames, and {} have no times to tell which "
                           "belong together: give one pose a frame, or times for both.",
                           poses.size(), times_s.size(), poses_timed ? "the frames" : "the poses"));
+}
+
+std::vector<std::optional<cv::Vec3d>> read_positions(
+    const std::string& path, const std::vector<std::optional<double>>& times_s, int every) {
+  const std::vector<CameraPose> poses = read_poses(path);
+  const bool frames_timed =
+      std::ranges::any_of(times_s, [](const auto& time) { return time.has_value(); });
+  if (!have_times(poses) || (!frames_timed && !times_s.empty())) {
+    return positions_by_row(path, poses, times_s.empty() ? poses.size() : times_s.size(),
+                            times_s.empty() ? 1 : every);
+  }
+  std::vector<std::optional<cv::Vec3d>> positions_m;
+  if (times_s.empty()) return positions_m;
+  positions_m.reserve(times_s.size());
+  for (const auto& pose : poses_of_frames(poses, times_s)) {
+    positions_m.push_back(pose ? std::optional(pose->position_m) : std::nullopt);
+  }
+  return positions_m;
+}
+
+void check_poses(const std::string& path, std::optional<std::size_t> frames, int every) {
+  const std::vector<CameraPose> poses = read_poses(path);
+  if (frames && !have_times(poses)) (void)positions_by_row(path, poses, *frames, every);
 }
 
 }  // namespace loopbit

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
@@ -35,6 +36,18 @@ std::vector<std::optional<CameraPose>> poses_of_frames(
     const std::vector<CameraPose>& poses, const std::vector<std::optional<double>>& times_s);
 
 inline constexpr double kMaxPoseDelay_s = 0.05;
+
+/// Camera centres by a file of poses, one for each of the frames read, every `every`-th of the
+/// sequence, whose times are `times_s`. By time where poses and frames have times; else frame k is
+/// row k * every, and more rows are those of a run that ended early. Where `times_s` is empty, the
+/// frames are not known: all rows that have no times. Throws Error (kind input) as read_poses and
+/// poses_of_frames do, and where rows are too few; (kind option) if `every` is less than 1.
+std::vector<std::optional<cv::Vec3d>> read_positions(
+    const std::string& path, const std::vector<std::optional<double>>& times_s, int every = 1);
+
+/// Throws what read_positions() would, as far as can be told before the frames are read, of which
+/// there will be `frames` if that is known.
+void check_poses(const std::string& path, std::optional<std::size_t> frames, int every = 1);
 
 /// When two frames with known poses show the same place.
 struct PoseTruthOptions {
