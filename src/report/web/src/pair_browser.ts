@@ -99,7 +99,7 @@ export class PairBrowser implements View {
     const isChoice = verdict === "missed" || verdict === "wrong" || against !== "match";
     if (isChoice) {
       add(candidateName(model, frame), "match");
-      if (truth !== null) add(`true place ${truth}`, "truth");
+      if (truth !== null && truth !== model.match(frame)) add(`true place ${truth}`, "truth");
       if (typeof against === "number") add(`frame ${against}`, against);
     }
     renew(this.partners, choices);

@@ -93,7 +93,7 @@ export class Store {
     const run = this.models[wanted.run] ? wanted.run : 0;
     const frames = this.models[run]?.frames ?? 0;
     const frame = Math.min(Math.max(0, wanted.frame), Math.max(0, frames - 1));
-    const isMatch = wanted.against === this.models[run]?.match(frame);
+    const isMatch = this.models[run]?.isWithCandidate({ frame, against: wanted.against });
     const isFrame = typeof wanted.against !== "number" || wanted.against < frames;
     return { ...wanted, run, frame, against: isFrame && !isMatch ? wanted.against : "match" };
   }
