@@ -74,7 +74,9 @@ async function checkScore(page, run) {
     );
   }
   const [, tolerated = "0", , apart = "0"] =
-    sentence.match(/(\d+) tolerated( \((\d+) of them at missed revisits\))?/) ?? [];
+    sentence.match(
+      /(\d+) tolerated( \((\d+) of them at (?:a missed revisit|missed revisits)\))?/,
+    ) ?? [];
   assert.equal(Number(tolerated), evaluation.tolerated, sentence);
   assert.equal(Number(tolerated) - Number(apart), tally("tolerated"), sentence);
   for (const [key, value] of Object.entries(figuresOf(evaluation)))

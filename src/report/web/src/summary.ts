@@ -44,7 +44,8 @@ const noRevisits = ({ run }: RunModel) =>
 /** A tolerated loop does not find a revisit, which is marked as missed. */
 function toleratedOf(model: RunModel, tolerated: number): string {
   const missed = model.loopsMarked("missed").length;
-  const at = missed === 0 ? "" : ` (${format.count(missed)} of them at missed revisits)`;
+  const where = missed === 1 ? "a missed revisit" : "missed revisits";
+  const at = missed === 0 ? "" : ` (${format.count(missed)} of them at ${where})`;
   return `${format.count(tolerated)} tolerated${at}`;
 }
 
