@@ -78,10 +78,11 @@ export class Matrix implements View {
     this.plot.follow();
   }
 
-  /** The cell of the selected frame and what is beside it. */
-  private place(): Point | null {
+  /** The cell of the selected frame and what is beside it, or the end of its row. */
+  private place(): Point {
+    const { frame } = this.store.now;
     const partner = this.store.model.partner(this.store.now);
-    return partner === null ? null : { x: partner + 0.5, y: this.store.now.frame + 0.5 };
+    return { x: (partner ?? frame) + 0.5, y: frame + 0.5 };
   }
 
   private showImage(image: SimilarityImage | null): void {
@@ -198,11 +199,11 @@ export class Matrix implements View {
   private selected(to: Projection): SVGElement[] {
     const { frame } = this.store.now;
     const place = this.place();
-    const y = to.y(frame + 0.5);
+    const y = to.y(place.y);
     const marks: SVGElement[] = [
       svg("line", { class: "hair", x1: 0, x2: to.x(frame + 0.5), y1: y, y2: y }),
     ];
-    if (place) {
+    if (this.store.model.partner(this.store.now) !== null) {
       const x = to.x(place.x);
       marks.push(svg("line", { class: "hair", x1: x, x2: x, y1: y, y2: to.height }));
       marks.push(svg("circle", { class: "selected", cx: x, cy: y, r: 8, "data-frame": frame }));
