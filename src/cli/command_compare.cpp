@@ -112,8 +112,7 @@ void print_table(const std::vector<Row>& rows) {
   for (const Row& row : rows) width = std::max(width, row.name.size());
   fmt::print(
       "{:<{}}  revisits  recall  precision  wrong  R@100%P  avg.prec.  pair recall   mean ms    "
-      "p99 "
-      "ms\n",
+      "p99 ms\n",
       "run", width);
   for (const Row& row : rows) {
     const Evaluation& e = row.evaluation;

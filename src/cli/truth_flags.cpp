@@ -2,9 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "truth_flags.hpp"
 
-#include <algorithm>
-#include <utility>
-
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"

@@ -210,8 +210,9 @@ FinishedRun read_run(const std::string& path) {
     run.truth = {.same_place = read_place_runs((folder / kTruthFile).string()),
                  .near_place = read_place_runs((folder / kNotFalseFile).string()),
                  .ignored = read_frame_list((folder / kIgnoreFile).string()),
-                 .unknown = read_frame_list((folder / kUnknownFile).string()),
                  .every = truth_every(run.record_json)};
+    const fs::path unknown = folder / kUnknownFile;  // which earlier versions did not write
+    if (is_there(unknown)) run.truth->unknown = read_frame_list(unknown.string());
   }
   if (is_there(folder / kPositionsFile)) {
     run.positions_m = read_positions((folder / kPositionsFile).string(), run.detections.size());
