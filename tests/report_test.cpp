@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 
 #include <nlohmann/json.hpp>
 
@@ -104,6 +105,16 @@ TEST_F(ReportTest, PicturesKeepToTheBudget) {
   EXPECT_GE(some.size(), 1U);
   EXPECT_LT(some.size(), 4U);
   EXPECT_LE(some.dump().size(), 5 * one / 2 + 100);
+}
+
+TEST_F(ReportTest, MoreFramesThanAPageShowsAreRefused) {
+  ReportRun run;
+  run.name = "other";
+  for (const int query : {2'000'000, std::numeric_limits<int>::max()}) {
+    run.list.matches = {{query, 5, 1.0, true}};
+    test::expect_error(ErrorKind::input, {"'other'", "2000000", "loopbit eval"},
+                       [&] { (void)report_json({run}); });
+  }
 }
 
 TEST_F(ReportTest, AnyDetectorsMatchesCanBeShown) {

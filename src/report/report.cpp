@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <limits>
 #include <string_view>
 #include <unordered_map>
@@ -36,10 +37,12 @@ struct FrameCount {
   bool is_known = false;  ///< else there may be more
 };
 
-int listed_frames(const ReportRun& run) { return static_cast<int>(run.list.times_s.size()); }
+std::int64_t listed_frames(const ReportRun& run) {
+  return static_cast<std::int64_t>(run.list.times_s.size());
+}
 
 /// As many as there must be for all that is said about them. `truth`: in their numbers.
-int least_frames(const MatchList& list, const std::optional<GroundTruth>& truth) {
+std::int64_t least_frames(const MatchList& list, const std::optional<GroundTruth>& truth) {
   int last = -1;
   for (const ReportedMatch& match : list.matches) last = std::max({last, match.query, match.match});
   for (const int query : list.elsewhere) last = std::max(last, query);
@@ -48,18 +51,30 @@ int least_frames(const MatchList& list, const std::optional<GroundTruth>& truth)
     for (const PlaceRun& run : truth->near_place) last = std::max(last, run.query);
     for (const int query : truth->ignored) last = std::max(last, query);
   }
-  return last + 1;
+  return std::int64_t{last} + 1;
+}
+
+/// Throws Error (kind input) where a page could not show so many.
+int checked(std::int64_t frames, const std::string& name) {
+  constexpr std::int64_t kMaxFrames = 2'000'000;
+  if (frames <= kMaxFrames) return static_cast<int>(frames);
+  throw Error(ErrorKind::input,
+              fmt::format("'{}' tells of {} frames, but a page shows at most {}; leave out frames, "
+                          "or use 'loopbit eval', which needs none.",
+                          name, frames, kMaxFrames));
 }
 
 /// Where a detector lists none, those of the other runs, which are about the same images, or as
 /// many as there are positions.
 FrameCount frame_count(const ReportRun& run, const std::optional<GroundTruth>& truth,
                        const std::vector<ReportRun>& runs) {
-  if (const int listed = listed_frames(run); listed > 0) return {listed, true};
-  int known = static_cast<int>(run.positions_m.size());
+  if (const std::int64_t listed = listed_frames(run); listed > 0) {
+    return {checked(listed, run.name), true};
+  }
+  auto known = static_cast<std::int64_t>(run.positions_m.size());
   for (const ReportRun& other : runs) known = std::max(known, listed_frames(other));
-  const int least = least_frames(run.list, truth);
-  return {std::max(known, least), known > 0 && known >= least};
+  const std::int64_t least = least_frames(run.list, truth);
+  return {checked(std::max(known, least), run.name), known > 0 && known >= least};
 }
 
 /// Of each frame the match that speaks for it: accepted before rejected, then by score.

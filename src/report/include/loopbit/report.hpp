@@ -28,8 +28,8 @@ struct ReportOptions {
 };
 
 /// Writes one HTML file that shows `runs`, needs nothing beside it and asks nothing of a network.
-/// Throws Error: kind input if a run's evidence is damaged, kind output if `path` cannot be
-/// written. Cost: about a second for 10,000 frames.
+/// Throws Error: kind input if a run's evidence is damaged or it has over 2,000,000 frames, output
+/// if `path` cannot be written. Cost: about a second for 10,000 frames.
 void write_report(const std::string& path, const std::vector<ReportRun>& runs,
                   const ReportOptions& options = {});
 
