@@ -194,7 +194,7 @@ int run_session(Session session, const SessionFlags& flags) {
   if (!flags.no_report)
     write_report(folder.report_path(), {report_run(folder.path())}, flags.report);
   print_summary(recorded.record(), folder, !flags.no_report);
-  if (fault && !stop_requested) throw *fault;
+  if (fault && !stop_requested) throw Error(fault->kind(), fault->what());
   if (fault) tell(fmt::format("loopbit: {}\n", fault->what()));
   return stop_requested ? interrupted : success;
 }
