@@ -94,12 +94,23 @@ def test_whole_numbers_of_any_type_are_taken():
     assert len(loopbit.MatchList([], [], [], [])) == 0
 
 
-def test_names_that_are_no_utf8(dataset, tmp_path):
+def latin_folder(dataset, tmp_path):
     folder = tmp_path / LATIN
     folder.mkdir()
     for number in range(2):
         (folder / f"{LATIN}{number}.png").write_bytes(
             (dataset / "images" / f"00000{number}.png").read_bytes())
+    return folder
+
+
+def test_a_report_of_names_that_are_no_utf8(dataset, tmp_path):
+    run = loopbit.run_folder(latin_folder(dataset, tmp_path), tmp_path / f"{LATIN}_run",
+                             on_bad_frame=[].append)
+    assert loopbit.write_report(run) == f"{run.path}/report.html"
+
+
+def test_names_that_are_no_utf8(dataset, tmp_path):
+    folder = latin_folder(dataset, tmp_path)
     (folder / f"{LATIN}9.png").write_bytes(b"no image")
     frames = list(loopbit.open_source(folder))
     assert [frame.name for frame in frames] == [f"{LATIN}{n}.png" for n in (0, 1, 9)]
@@ -112,7 +123,6 @@ def test_names_that_are_no_utf8(dataset, tmp_path):
     run = loopbit.run_folder(folder, map=path, on_bad_frame=bad.append)
     assert len(bad) == 1 and LATIN in bad[0]
     assert run.path == str(tmp_path / f"{LATIN}_session_1") and LATIN in repr(run)
-    assert loopbit.write_report(run) == f"{run.path}/report.html"
     map = loopbit.MapReader(path)
     assert map.path == str(path) and map.sessions[0].name == str(folder)
     with loopbit.MapWriter(path, map.options, str(folder)) as writer:
