@@ -372,21 +372,10 @@ TEST(Run, BadFramesAreCountedAndTheRunGoesOn) {
   EXPECT_NE(told.sentences[2].find("frame 4"), std::string::npos);
 }
 
-TEST(Run, FramesWithoutTimesEndItWhereASettingIsInSeconds) {
-  auto list = frames(2);
-  list[0].timestamp_s.reset();
-  FrameSource source(list);
-  LoopDetectorOptions options;
-  options.exclusion.seconds = 5;
-  LoopDetector detector(options);
-  test::expect_error(ErrorKind::option, {"exclusion.seconds is 5", "frame 0"}, [&] {
-    run(source, detector, {[](const Detection&) {}, [](const std::string&) {}}, false);
-  });
-}
-
-TEST(Run, ALaterFrameWithoutATimeIsLeftOut) {
+/// What a run comes to whose window is 5 seconds and whose frame `untimed` of three has no time.
+std::vector<Status> run_without_a_time(std::size_t untimed) {
   auto list = frames(3);
-  list[1].timestamp_s.reset();
+  list[untimed].timestamp_s.reset();
   FrameSource source(list);
   LoopDetectorOptions options;
   options.exclusion.seconds = 5;
@@ -394,7 +383,16 @@ TEST(Run, ALaterFrameWithoutATimeIsLeftOut) {
   std::vector<Status> seen;
   run(source, detector,
       {[&](const Detection& d) { seen.push_back(d.status); }, [](const std::string&) {}}, false);
-  EXPECT_EQ(seen,
+  return seen;
+}
+
+TEST(Run, FramesWithoutTimesEndItWhereASettingIsInSeconds) {
+  test::expect_error(ErrorKind::option, {"exclusion.seconds is 5", "frame 0"},
+                     [] { (void)run_without_a_time(0); });
+}
+
+TEST(Run, ALaterFrameWithoutATimeIsLeftOut) {
+  EXPECT_EQ(run_without_a_time(1),
             (std::vector{Status::no_earlier_place, Status::unreadable, Status::no_earlier_place}));
 }
 

@@ -13,6 +13,7 @@
 #include "loopbit/error.hpp"
 
 #include "cells.hpp"
+#include "frames_read.hpp"
 #include "text_rows.hpp"
 
 namespace loopbit {
@@ -114,17 +115,9 @@ bool have_times(const std::vector<CameraPose>& poses) {
 std::vector<std::optional<cv::Vec3d>> positions_by_row(const std::string& path,
                                                        const std::vector<CameraPose>& poses,
                                                        std::size_t frames, int every) {
-  if (every < 1) {
-    throw Error(ErrorKind::option,
-                fmt::format("every is {}, but must be 1 (all frames) or more.", every));
-  }
+  datasets::check_every(every);
+  datasets::check_rows(path, poses.size(), "poses", frames, every);
   const auto step = static_cast<std::size_t>(every);
-  if (frames > 0 && (frames - 1) * step >= poses.size()) {
-    throw Error(ErrorKind::input,
-                fmt::format("'{}' has {} poses, but the sequence has {} frames: give a pose for "
-                            "each, or leave it out.",
-                            path, poses.size(), (frames - 1) * step + 1));
-  }
   std::vector<std::optional<cv::Vec3d>> positions_m;
   positions_m.reserve(frames);
   for (std::size_t k = 0; k < frames; ++k) positions_m.emplace_back(poses[k * step].position_m);

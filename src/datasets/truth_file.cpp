@@ -12,6 +12,7 @@
 #include "loopbit/error.hpp"
 
 #include "cells.hpp"
+#include "frames_read.hpp"
 #include "image_file.hpp"
 #include "mat_file.hpp"
 #include "text_rows.hpp"
@@ -91,19 +92,6 @@ TruthMatrix parse_matrix(const std::string& path, const std::vector<TextRow>& ro
   return matrix;
 }
 
-/// Throws Error (kind input) where `rows`, one a frame of the whole sequence, end before the last
-/// of the frames read. `things`: what rows are.
-void check_rows(const std::string& path, std::size_t rows, const char* things,
-                std::size_t frames_read, int every) {
-  if (frames_read == 0) return;
-  const std::size_t last = (frames_read - 1) * static_cast<std::size_t>(every);
-  if (last < rows) return;
-  throw Error(ErrorKind::input,
-              fmt::format("'{}' tells of {} {}, but the sequence has {} frames: give what is true "
-                          "of this sequence, and of all its frames where some are left out.",
-                          path, rows, things, last + 1));
-}
-
 /// Of the frames of a matrix with so many views every so-many-th was read.
 int every_of_matrix(const TruthOptions& options) {
   if (options.every == 1) return 1;
@@ -117,7 +105,7 @@ int every_of_matrix(const TruthOptions& options) {
 GroundTruth truth_of(const TruthMatrix& matrix, const std::string& path,
                      const TruthOptions& options, const Times& times_s) {
   const int every = every_of_matrix(options);
-  check_rows(path, matrix.frames(), "frames", times_s.size(), every);
+  datasets::check_rows(path, matrix.frames(), "frames", times_s.size(), every);
   return {.same_place = matrix.runs(), .every = every};
 }
 
@@ -154,7 +142,7 @@ GroundTruth read_pose_truth(const std::string& path, const TruthOptions& options
   if (poses_timed && std::ranges::any_of(times_s, has_time)) {
     return truth_by_time(poses, options, times_s);
   }
-  check_rows(path, poses.size(), "poses", times_s.size(), options.every);
+  datasets::check_rows(path, poses.size(), "poses", times_s.size(), options.every);
   GroundTruth truth = truth_from_poses({poses.begin(), poses.end()}, options.poses);
   truth.every = options.every;
   return truth;
@@ -188,12 +176,10 @@ GroundTruth read_truth(const std::string& path, const TruthOptions& options,
     throw Error(ErrorKind::option,
                 fmt::format("views is {}, but must be 1 (a row a frame) or more.", options.views));
   }
-  const auto frames = static_cast<double>(times_s.size()) * options.every;
-  if (options.every < 1 || frames > std::numeric_limits<int>::max()) {
-    throw Error(ErrorKind::option,
-                fmt::format("every is {}, but must be 1 (all frames) or more, and no frame's "
-                            "number over {}.",
-                            options.every, std::numeric_limits<int>::max()));
+  datasets::check_every(options.every);
+  if (static_cast<double>(times_s.size()) * options.every > std::numeric_limits<int>::max()) {
+    throw Error(ErrorKind::option, fmt::format("every is {}, but no frame's number may be over {}.",
+                                               options.every, std::numeric_limits<int>::max()));
   }
   if (is_mat_file(path)) {
     return truth_of(datasets::read_mat_file(path, options.variable, options.views), path, options,

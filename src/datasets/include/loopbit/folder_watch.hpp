@@ -16,11 +16,11 @@ class FolderWatch {
   /// Throws Error (kind input) if `folder` is no folder.
   explicit FolderWatch(const std::string& folder);
 
-  /// Paths of the images that are new since the last call, in natural order. A file is given
-  /// when neither its size nor its time has changed between two calls, and again only when one
-  /// has. Hidden files and files that
-  /// are no images by their extension are passed over, so that one may be written as `.name` and
-  /// renamed. Throws Error (kind input) if the folder cannot be read any more.
+  /// Paths of the images that are new since the last call, in natural order. A file is given when
+  /// neither its size nor its time has changed between two calls, and again only when one has.
+  /// Hidden files and files that are no images by their extension are passed over, so that one may
+  /// be written as `.name` and renamed. Throws Error (kind input) if the folder cannot be read any
+  /// more.
   std::vector<std::string> arrived();
 
  private:

@@ -1,0 +1,20 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+namespace loopbit::datasets {
+
+// Of a sequence every so-many-th frame was read.
+
+/// Throws Error (kind option) if `every` is less than 1.
+void check_every(int every);
+
+/// Throws Error (kind input) where `rows` of the file at `path`, one a frame of the whole sequence,
+/// end before the last of the frames read. `things`: what rows are.
+void check_rows(const std::string& path, std::size_t rows, const char* things,
+                std::size_t frames_read, int every);
+
+}  // namespace loopbit::datasets
