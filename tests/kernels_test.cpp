@@ -36,6 +36,32 @@ Bytes random_bytes(Random& random, std::size_t descriptors) {
   return bytes;
 }
 
+/// As describe() makes them: no sum of dx or dy is larger than that of |dx| or |dy|. Their squared
+/// length comes near 2^16, and the values of a third of them lie in two columns of bins.
+Bytes random_regular_bytes(Random& random, std::size_t descriptors) {
+  Bytes bytes(descriptors * kDescriptorSize, 0);
+  for (std::size_t i = 0; i < descriptors; ++i) {
+    std::int8_t* descriptor = bytes.data() + i * kDescriptorSize;
+    const std::size_t columns = i % 3 == 0 ? 2 : 4;
+    for (int left = 65'535, tries = 0; tries < 500; ++tries) {
+      const auto pick = [&](std::size_t end) {
+        return static_cast<std::size_t>(random.between(0, static_cast<int>(end) - 1));
+      };
+      const std::size_t signed_value = 16 * pick(4) + 4 * pick(2) + pick(columns);
+      std::int8_t& size = descriptor[signed_value + 8];
+      const int larger = std::min(size + random.between(1, 40), 127);
+      const int sum = random.between(-larger, larger);
+      const int before = size * size + descriptor[signed_value] * descriptor[signed_value];
+      const int after = larger * larger + sum * sum;
+      if (after - before > left) continue;
+      left -= after - before;
+      size = static_cast<std::int8_t>(larger);
+      descriptor[signed_value] = static_cast<std::int8_t>(sum);
+    }
+  }
+  return bytes;
+}
+
 std::vector<std::uint16_t> max_overlaps(const Kernels& kernels, const Words& queries,
                                         const Words& places) {
   std::vector<std::uint16_t> overlaps(places.size() / kContentWords, 9999);
@@ -298,6 +324,41 @@ TEST_P(EveryKernel, FindsTheNearestTwoAmongAnyNumber) {
     ASSERT_EQ(nearest_two(*GetParam(), descriptors, others),
               expected_neighbours(descriptors, others))
         << num_others << " others";
+  }
+}
+
+TEST_P(EveryKernel, FindsTheNearestTwoOfRegularDescriptors) {
+  Random random;
+  for (const std::size_t num_others : {1U, 2U, 3U, 4U, 5U, 7U, 8U, 12U, 31U, 257U, 601U}) {
+    const Bytes descriptors = random_regular_bytes(random, kMatchLanes);
+    Bytes others = random_regular_bytes(random, num_others);
+    std::copy_n(descriptors.begin(), kDescriptorSize, others.end() - kDescriptorSize);
+    ASSERT_EQ(nearest_two(*GetParam(), descriptors, others),
+              expected_neighbours(descriptors, others))
+        << num_others << " others";
+  }
+}
+
+TEST_P(EveryKernel, OneDescriptorMayBeIrregular) {
+  Random random;
+  const Bytes descriptors = random_regular_bytes(random, kMatchLanes);
+  const Bytes others = random_regular_bytes(random, 20);
+  // A sum above that of magnitudes, then one of negative magnitudes, then too long a descriptor.
+  std::vector<Bytes> irregular(3, Bytes(kDescriptorSize, 0));
+  irregular[0][16] = 127;
+  irregular[1][8] = -127;
+  std::fill_n(irregular[2].begin(), kDescriptorSize, std::int8_t{127});
+  for (const Bytes& bytes : irregular) {
+    for (const std::size_t at : {0U, 9U, 15U}) {
+      Bytes with = descriptors;
+      std::copy(bytes.begin(), bytes.end(), with.data() + at * kDescriptorSize);
+      ASSERT_EQ(nearest_two(*GetParam(), with, others), expected_neighbours(with, others));
+      Bytes among = others;
+      std::copy(bytes.begin(), bytes.end(), among.data() + at * kDescriptorSize);
+      ASSERT_EQ(nearest_two(*GetParam(), descriptors, among),
+                expected_neighbours(descriptors, among));
+      ASSERT_EQ(nearest_two(*GetParam(), with, among), expected_neighbours(with, among));
+    }
   }
 }
 

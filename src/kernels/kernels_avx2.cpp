@@ -44,116 +44,227 @@ int overlap(const std::uint64_t* a, const std::uint64_t* b) {
 }
 
 // Matching. VPMADDUBSW multiplies unsigned by signed bytes; |a| times b with the sign of a is the
-// product, and two products of at most 127 * 127 fit in its 16 bits.
+// product, and two products of at most 127 * 127 fit in its 16 bits. Distances are kept with the
+// number of their descriptor in the lowest bits, so that the smallest of them tells both.
+//
+// Descriptors as describe() makes them are regular: no sum of dx or dy is larger than that of |dx|
+// or |dy|, and |a|^2 < 2^16. Of two regular ones the products dx dx' + |dx| |dx'| are not negative,
+// nor is a sum of them, which is at most |a| |b|: it fits in 16 bits, whatever overflows on the
+// way.
 
 constexpr std::size_t kChunks = kDescriptorSize / 4;
 constexpr std::size_t kLanes = 8;
+constexpr std::size_t kKinds = 4;   // of sums in a row of bins: dx, dy, |dx|, |dy|, a chunk of each
+constexpr std::size_t kSigned = 2;  // of them
+constexpr std::size_t kAtOnce = 3;  // whose sums with 16 descriptors there are registers for
+/// Descriptors are numbered in runs of so many. A distance takes 23 bits.
+constexpr int kNumberBits = 8;
+constexpr std::size_t kNumbers = std::size_t{1} << kNumberBits;
+/// In the constant of a descriptor that is not regular.
+constexpr std::int32_t kIrregular = 1 << 30;
 
-/// For each lane, the sum of the products of its 4 bytes.
-__m256i products_of_4(__m256i magnitudes, __m256i signs, __m256i bytes) {
-  const __m256i pairs = _mm256_maddubs_epi16(magnitudes, _mm256_sign_epi8(bytes, signs));
-  return _mm256_madd_epi16(pairs, _mm256_set1_epi16(1));
-}
+/// For each lane, the sum of its two 16-bit parts.
+__m256i sum_of_parts(__m256i parts) { return _mm256_madd_epi16(parts, _mm256_set1_epi16(1)); }
 
-void describe_constants(const std::int8_t* descriptors, std::size_t num_descriptors,
-                        std::int32_t* constants) {
-  for (std::size_t i = 0; i < num_descriptors; ++i) {
-    const __m256i low = load(descriptors + i * kDescriptorSize);
-    const __m256i high = load(descriptors + i * kDescriptorSize + 32);
-    const __m256i sums = _mm256_add_epi32(products_of_4(_mm256_abs_epi8(low), low, low),
-                                          products_of_4(_mm256_abs_epi8(high), high, high));
-    __m128i half = _mm_add_epi32(_mm256_castsi256_si128(sums), _mm256_extracti128_si256(sums, 1));
-    half = _mm_add_epi32(half, _mm_shuffle_epi32(half, _MM_SHUFFLE(1, 0, 3, 2)));
-    half = _mm_add_epi32(half, _mm_shuffle_epi32(half, _MM_SHUFFLE(2, 3, 0, 1)));
-    constants[i] = _mm_cvtsi128_si32(half);
-  }
+__m256i unsigned_sum_of_parts(__m256i parts) {
+  return _mm256_add_epi32(_mm256_srli_epi32(parts, 16),
+                          _mm256_and_si256(parts, _mm256_set1_epi32(0xFFFF)));
 }
 
 /// 8 descriptors, chunk by chunk of 4 bytes.
 struct Lanes {
   __m256i bytes[kChunks];
   __m256i magnitudes[kChunks];
-  __m256i squares;  ///< of their lengths
+  __m256i squares;       ///< of their lengths
+  __m256i is_irregular;  ///< all bits or none
 };
 
-void transpose(const std::int8_t* descriptors, Lanes& lanes) {
-  const __m256i first_bytes = _mm256_mullo_epi32(_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7),
-                                                 _mm256_set1_epi32(kDescriptorSize));
-  lanes.squares = _mm256_setzero_si256();
-  for (std::size_t c = 0; c < kChunks; ++c) {
-    const auto* bytes = reinterpret_cast<const int*>(descriptors + 4 * c);
-    lanes.bytes[c] = _mm256_i32gather_epi32(bytes, first_bytes, 1);
-    lanes.magnitudes[c] = _mm256_abs_epi8(lanes.bytes[c]);
-    lanes.squares =
-        _mm256_add_epi32(lanes.squares, products_of_4(lanes.magnitudes[c], lanes.bytes[c],  //
-                                                      lanes.bytes[c]));
+/// Half of each of 8 descriptors.
+void transpose(const std::int8_t* descriptors, __m256i* chunks) {
+  __m256i pairs[kLanes];
+  for (std::size_t i = 0; i < kLanes; i += 2) {
+    const __m256i a = load(descriptors + i * kDescriptorSize);
+    const __m256i b = load(descriptors + (i + 1) * kDescriptorSize);
+    pairs[i] = _mm256_unpacklo_epi32(a, b);
+    pairs[i + 1] = _mm256_unpackhi_epi32(a, b);
+  }
+  for (std::size_t i = 0; i < 2; ++i) {  // chunks 2 i, 2 i + 1, and four later
+    const __m256i low_first = _mm256_unpacklo_epi64(pairs[i], pairs[i + 2]);
+    const __m256i low_next = _mm256_unpackhi_epi64(pairs[i], pairs[i + 2]);
+    const __m256i high_first = _mm256_unpacklo_epi64(pairs[i + 4], pairs[i + 6]);
+    const __m256i high_next = _mm256_unpackhi_epi64(pairs[i + 4], pairs[i + 6]);
+    chunks[2 * i] = _mm256_permute2x128_si256(low_first, high_first, 0x20);
+    chunks[2 * i + 1] = _mm256_permute2x128_si256(low_next, high_next, 0x20);
+    chunks[2 * i + 4] = _mm256_permute2x128_si256(low_first, high_first, 0x31);
+    chunks[2 * i + 5] = _mm256_permute2x128_si256(low_next, high_next, 0x31);
   }
 }
 
-struct BestTwo {
-  __m256i index;
-  __m256i best;
-  __m256i second;
+void lay_side_by_side(const std::int8_t* descriptors, Lanes& lanes) {
+  transpose(descriptors, lanes.bytes);
+  transpose(descriptors + kDescriptorSize / 2, lanes.bytes + kChunks / 2);
+  lanes.squares = _mm256_setzero_si256();
+  __m256i too_small = _mm256_setzero_si256();
+  for (std::size_t c = 0; c < kChunks; ++c) {
+    const __m256i magnitudes = _mm256_abs_epi8(lanes.bytes[c]);
+    lanes.magnitudes[c] = magnitudes;
+    lanes.squares =
+        _mm256_add_epi32(lanes.squares, sum_of_parts(_mm256_maddubs_epi16(magnitudes, magnitudes)));
+    if (c % kKinds >= kSigned) continue;
+    const __m256i above = _mm256_cmpgt_epi8(magnitudes, lanes.bytes[c + kSigned]);
+    too_small = _mm256_or_si256(too_small, above);
+  }
+  const __m256i too_long = _mm256_cmpgt_epi32(lanes.squares, _mm256_set1_epi32(0xFFFF));
+  const __m256i none = _mm256_cmpeq_epi32(too_small, _mm256_setzero_si256());
+  lanes.is_irregular = _mm256_or_si256(too_long, _mm256_xor_si256(none, _mm256_set1_epi32(-1)));
+}
 
-  void offer(__m256i distances, std::int32_t number) {
-    const __m256i nearer = _mm256_cmpgt_epi32(best, distances);
-    second = _mm256_min_epi32(second, _mm256_max_epi32(best, distances));
-    best = _mm256_min_epi32(best, distances);
-    index = _mm256_blendv_epi8(index, _mm256_set1_epi32(number), nearer);
+void describe_constants(const std::int8_t* descriptors, std::size_t num_descriptors,
+                        std::int32_t* constants) {
+  for (std::size_t i = 0; i < num_descriptors; i += kLanes) {
+    alignas(32) std::int32_t numbered[kLanes];
+    const std::size_t count = num_descriptors - i < kLanes ? num_descriptors - i : kLanes;
+    std::int8_t last[kLanes * kDescriptorSize] = {};
+    const std::int8_t* first = descriptors + i * kDescriptorSize;
+    if (count < kLanes) {
+      __builtin_memcpy(last, first, count * kDescriptorSize);
+      first = last;
+    }
+    Lanes lanes;
+    lay_side_by_side(first, lanes);
+    const __m256i numbers =
+        _mm256_add_epi32(_mm256_set1_epi32(static_cast<std::int32_t>(i % kNumbers)),
+                         _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+    const __m256i flags = _mm256_and_si256(lanes.is_irregular, _mm256_set1_epi32(kIrregular));
+    const __m256i squares = _mm256_slli_epi32(lanes.squares, kNumberBits);
+    _mm256_store_si256(reinterpret_cast<__m256i*>(numbered),
+                       _mm256_or_si256(_mm256_or_si256(squares, numbers), flags));
+    __builtin_memcpy(constants + i, numbered, count * sizeof *numbered);
+  }
+}
+
+/// The two smallest numbers offered to each lane.
+struct SmallestTwo {
+  __m256i smallest = _mm256_set1_epi32(NearestTwo::kNone);
+  __m256i second = smallest;
+
+  void offer(__m256i numbers) {
+    second = _mm256_min_epi32(second, _mm256_max_epi32(smallest, numbers));
+    smallest = _mm256_min_epi32(smallest, numbers);
   }
 };
 
-/// Offers the descriptors from `others` on, as many as Count.
-template <std::size_t Count>
-void offer_products(const Lanes& lanes, const std::int8_t* others, const std::int32_t* constants,
-                    std::int32_t number, BestTwo& two) {
-  __m256i sums[Count];
-  for (std::size_t i = 0; i < Count; ++i) sums[i] = _mm256_setzero_si256();
-  for (std::size_t c = 0; c < kChunks; ++c) {
-    for (std::size_t i = 0; i < Count; ++i) {
-      std::int32_t chunk = 0;
-      __builtin_memcpy(&chunk, others + i * kDescriptorSize + 4 * c, sizeof chunk);
-      sums[i] = _mm256_add_epi32(
-          sums[i], products_of_4(lanes.magnitudes[c], lanes.bytes[c], _mm256_set1_epi32(chunk)));
+/// Adds the products of a chunk to `sums`: if all descriptors are regular, in 16-bit parts.
+template <bool IsRegular, bool IsSigned>
+void add_products(const Lanes& lanes, std::size_t chunk, __m256i other, __m256i& sums) {
+  if (IsSigned || !IsRegular) other = _mm256_sign_epi8(other, lanes.bytes[chunk]);
+  const __m256i products = _mm256_maddubs_epi16(lanes.magnitudes[chunk], other);
+  sums =
+      IsRegular ? _mm256_add_epi16(sums, products) : _mm256_add_epi32(sums, sum_of_parts(products));
+  // Products that are added later would need registers that there are not.
+  asm("" : "+x"(sums));
+}
+
+/// Offers the squared distances of 16 descriptors to Count others, less |descriptor|^2.
+template <bool IsRegular, std::size_t Count>
+void offer_distances(const Lanes* halves, const std::int8_t* others, const std::int32_t* constants,
+                     SmallestTwo* two) {
+  __m256i sums[2][Count];
+  for (std::size_t i = 0; i < Count; ++i) sums[0][i] = sums[1][i] = _mm256_setzero_si256();
+  for (std::size_t row = 0; row < kChunks; row += kKinds) {
+    const auto add_kind = [&]<bool IsSigned>(std::size_t kind) {
+#pragma GCC unroll 4
+      for (std::size_t i = 0; i < Count; ++i) {
+        std::int32_t chunk = 0;
+        __builtin_memcpy(&chunk, others + i * kDescriptorSize + 4 * (row + kind), sizeof chunk);
+        const __m256i other = _mm256_set1_epi32(chunk);
+        add_products<IsRegular, IsSigned>(halves[0], row + kind, other, sums[0][i]);
+        add_products<IsRegular, IsSigned>(halves[1], row + kind, other, sums[1][i]);
+      }
+    };
+    for (std::size_t kind = 0; kind < kSigned; ++kind) add_kind.template operator()<true>(kind);
+    for (std::size_t kind = kSigned; kind < kKinds; ++kind) {
+      add_kind.template operator()<false>(kind);
     }
   }
   for (std::size_t i = 0; i < Count; ++i) {
-    const __m256i squares = _mm256_add_epi32(lanes.squares, _mm256_set1_epi32(constants[i]));
-    two.offer(_mm256_sub_epi32(squares, _mm256_add_epi32(sums[i], sums[i])),
-              number + static_cast<std::int32_t>(i));
+    const __m256i constant = _mm256_set1_epi32(constants[i] & ~kIrregular);
+    for (std::size_t half = 0; half < 2; ++half) {
+      const __m256i sum = IsRegular ? unsigned_sum_of_parts(sums[half][i]) : sums[half][i];
+      two[half].offer(_mm256_sub_epi32(constant, _mm256_slli_epi32(sum, kNumberBits + 1)));
+    }
   }
 }
 
-/// nearest_two for 8 of the 16 descriptors.
-void nearest_two_of_8(const Lanes& lanes, const std::int8_t* others, const std::int32_t* constants,
-                      std::size_t num_others, std::size_t first, NearestTwo& nearest) {
-  constexpr std::size_t kAtOnce = 4;
-  const __m256i none = _mm256_set1_epi32(NearestTwo::kNone);
-  BestTwo two{_mm256_setzero_si256(), none, none};
+/// The nearest two of one run of others.
+template <bool IsRegular>
+void nearest_two_of_run(const Lanes* halves, const std::int8_t* others,
+                        const std::int32_t* constants, std::size_t num_others, SmallestTwo* two) {
   std::size_t i = 0;
   for (; i + kAtOnce <= num_others; i += kAtOnce) {
-    offer_products<kAtOnce>(lanes, others + i * kDescriptorSize, constants + i,
-                            static_cast<std::int32_t>(i), two);
+    offer_distances<IsRegular, kAtOnce>(halves, others + i * kDescriptorSize, constants + i, two);
   }
   for (; i < num_others; ++i) {
-    offer_products<1>(lanes, others + i * kDescriptorSize, constants + i,
-                      static_cast<std::int32_t>(i), two);
+    offer_distances<IsRegular, 1>(halves, others + i * kDescriptorSize, constants + i, two);
   }
-  const auto store = [&](std::int32_t* to, __m256i values) {
-    _mm256_store_si256(reinterpret_cast<__m256i*>(to + first), values);
-  };
-  store(nearest.index, two.index);
-  store(nearest.distance_sq, two.best);
-  store(nearest.second_distance_sq, two.second);
 }
+
+bool are_regular(const Lanes* halves, const std::int32_t* constants, std::size_t num_others) {
+  std::int32_t any = 0;
+  for (std::size_t i = 0; i < num_others; ++i) any |= constants[i];
+  const __m256i lanes = _mm256_or_si256(halves[0].is_irregular, halves[1].is_irregular);
+  return (any & kIrregular) == 0 && _mm256_testz_si256(lanes, lanes) != 0;
+}
+
+/// The nearest two of 8 of the 16 descriptors, those from `first` on.
+struct NearestOfHalf {
+  SmallestTwo distances;
+  __m256i index = _mm256_setzero_si256();
+
+  /// What is nearest among the others from number `begin` on.
+  void offer_run(const SmallestTwo& run, __m256i squares, std::size_t begin) {
+    const __m256i none = _mm256_set1_epi32(NearestTwo::kNone);
+    const auto distance_of = [&](__m256i numbered) {
+      const __m256i distance = _mm256_add_epi32(_mm256_srai_epi32(numbered, kNumberBits), squares);
+      return _mm256_blendv_epi8(distance, none, _mm256_cmpeq_epi32(numbered, none));
+    };
+    const __m256i distance = distance_of(run.smallest);
+    const __m256i number =
+        _mm256_and_si256(run.smallest, _mm256_set1_epi32(static_cast<int>(kNumbers - 1)));
+    index = _mm256_blendv_epi8(index,
+                               _mm256_add_epi32(number, _mm256_set1_epi32(static_cast<int>(begin))),
+                               _mm256_cmpgt_epi32(distances.smallest, distance));
+    distances.offer(distance);
+    distances.offer(distance_of(run.second));
+  }
+
+  void store(std::size_t first, NearestTwo& nearest) const {
+    const auto store_lanes = [&](std::int32_t* to, __m256i values) {
+      _mm256_store_si256(reinterpret_cast<__m256i*>(to + first), values);
+    };
+    store_lanes(nearest.index, index);
+    store_lanes(nearest.distance_sq, distances.smallest);
+    store_lanes(nearest.second_distance_sq, distances.second);
+  }
+};
 
 void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
                  const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest) {
-  for (std::size_t first = 0; first < kMatchLanes; first += kLanes) {
-    Lanes lanes;
-    transpose(descriptors + first * kDescriptorSize, lanes);
-    nearest_two_of_8(lanes, others, constants, num_others, first, nearest);
+  Lanes halves[2];
+  lay_side_by_side(descriptors, halves[0]);
+  lay_side_by_side(descriptors + kLanes * kDescriptorSize, halves[1]);
+  const bool regular = are_regular(halves, constants, num_others);
+  NearestOfHalf found[2];
+  for (std::size_t begin = 0; begin < num_others; begin += kNumbers) {
+    const std::size_t count = num_others - begin < kNumbers ? num_others - begin : kNumbers;
+    const auto search = regular ? nearest_two_of_run<true> : nearest_two_of_run<false>;
+    SmallestTwo run[2];
+    search(halves, others + begin * kDescriptorSize, constants + begin, count, run);
+    found[0].offer_run(run[0], halves[0].squares, begin);
+    found[1].offer_run(run[1], halves[1].squares, begin);
   }
+  found[0].store(0, nearest);
+  found[1].store(kLanes, nearest);
 }
 
 /// Two records of block counts. Eight minima of at most 16 fit in 8 bits.
