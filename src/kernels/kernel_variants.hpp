@@ -26,6 +26,8 @@ extern const Kernels kScalarKernels;
 #if defined(__x86_64__)
 extern const Kernels kAvx2Kernels;    ///< needs AVX2
 extern const Kernels kAvx512Kernels;  ///< needs AVX-512 F, BW, DQ, VL, VNNI and VPOPCNTDQ
+#elif defined(__aarch64__)
+extern const Kernels kDotprodKernels;  ///< needs the dot product extension, of Armv8.2-A
 #endif
 
 }  // namespace loopbit

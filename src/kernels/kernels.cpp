@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/kernels.hpp"
 
+#if defined(__aarch64__)
+#include <sys/auxv.h>
+#endif
+
 #include <algorithm>
 #include <cstdlib>
 #include <string>
@@ -25,6 +29,8 @@ std::vector<const Kernels*> kernels_of_this_processor() {
       __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0 &&
       __builtin_cpu_supports("avx512vnni") != 0 && __builtin_cpu_supports("avx512vpopcntdq") != 0;
   if (has_avx512) kernels.push_back(&kAvx512Kernels);
+#elif defined(__aarch64__)
+  if ((getauxval(AT_HWCAP) & HWCAP_ASIMDDP) != 0) kernels.push_back(&kDotprodKernels);
 #endif
   return kernels;
 }

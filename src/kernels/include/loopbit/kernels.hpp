@@ -27,7 +27,7 @@ struct Reached {
   std::uint16_t queries;  ///< a bit for each that has the least sum that is needed
 };
 
-/// 8-bit values in one descriptor.
+/// 8-bit values in one descriptor, from -127 to 127.
 inline constexpr std::size_t kDescriptorSize = 64;
 
 /// What one 8-bit descriptor value counts: a unit-length descriptor has the length 254.
@@ -115,7 +115,8 @@ struct EpipolarScore {
 
 /// The inner loops that decide the speed of loopbit, for one instruction set. All of them return
 /// the same bits: sums are of integers, or of floats in one fixed order without contraction. The
-/// scalar one is the reference; on Arm the compiler makes NEON code of it.
+/// scalar one is the reference; on Arm the compiler makes NEON code of it, and once more with the
+/// dot product extension.
 struct Kernels {
   std::string_view name;
 
@@ -199,7 +200,8 @@ struct Kernels {
                                   std::uint8_t* is_inlier);
 };
 
-/// The kernels this processor can run, slowest first: "scalar", "avx2", "avx512".
+/// The kernels this processor can run, slowest first: "scalar", then on x86-64 "avx2" and "avx512",
+/// on Arm "dotprod".
 std::span<const Kernels* const> available_kernels();
 
 /// The fastest of them, or the one that the environment variable LOOPBIT_KERNEL names (unless
