@@ -178,38 +178,12 @@ TEST(SaliencyMap, FollowsTheFormulaOnRealImages) {
   }
 }
 
-/// The mean grey level of each cell of a 64 x 64 grid, by the share of every pixel in it.
-cv::Mat1b mean_cells(const cv::Mat1b& gray) {
-  const auto share = [](int pixel, int cell, int pixels) {
-    const double side = pixels / 64.0;
-    return std::max(
-        0.0, std::min(pixel + 1.0, (cell + 1) * side) - std::max(double(pixel), cell * side));
-  };
-  cv::Mat1d rows(64, gray.rows);
-  cv::Mat1d columns(gray.cols, 64);
-  for (int cell = 0; cell < 64; ++cell) {
-    for (int y = 0; y < gray.rows; ++y) rows(cell, y) = share(y, cell, gray.rows);
-    for (int x = 0; x < gray.cols; ++x) columns(x, cell) = share(x, cell, gray.cols);
-  }
-  cv::Mat1d pixels;
-  gray.convertTo(pixels, CV_64F);
-  cv::Mat1d sums;
-  cv::gemm(rows * pixels, columns, 1, cv::noArray(), 0, sums);
-  const double cell_area = gray.rows / 64.0 * gray.cols / 64.0;
-  cv::Mat1b means(sums.size());
-  // Halves go up; a little more makes up for the rounding of doubles.
-  std::transform(sums.begin(), sums.end(), means.begin(), [&](double sum) {
-    return static_cast<std::uint8_t>(sum / cell_area + 0.5 + 1e-9);
-  });
-  return means;
-}
-
 TEST(SaliencyMap, LooksAtTheMeansOfEqualAreas) {
   for (const cv::Size size : {cv::Size(64, 64), cv::Size(65, 127), cv::Size(203, 131),
                               cv::Size(640, 480), cv::Size(1242, 375), cv::Size(4000, 64)}) {
     const cv::Mat1b gray = textured_image(size, 9);
-    EXPECT_EQ(cv::norm(saliency_map(gray), saliency_map(mean_cells(gray)), cv::NORM_INF), 0)
-        << size;
+    const cv::Mat1b means = area_means(gray, {64, 64});
+    EXPECT_EQ(cv::norm(saliency_map(gray), saliency_map(means), cv::NORM_INF), 0) << size;
   }
 }
 

@@ -243,11 +243,17 @@ double num_near(const std::vector<Keypoint>& keypoints, const std::vector<Keypoi
 }
 
 TEST(Surf, ScalesImagesAsOpenCVDoes) {
-  for (const cv::Size size : {cv::Size(512, 384), cv::Size(752, 480), cv::Size(1242, 375)}) {
+  struct Case {
+    cv::Size size;
+    cv::InterpolationFlags interpolation;
+  };
+  for (const auto& [size, interpolation] :
+       {Case{{512, 384}, cv::INTER_LINEAR_EXACT}, Case{{752, 480}, cv::INTER_LINEAR_EXACT},
+        Case{{1242, 375}, cv::INTER_LINEAR_EXACT}, Case{{1920, 1080}, cv::INTER_AREA}}) {
     const cv::Mat1b gray = textured_image(size, 3);
     const Features scaled_here = extract_surf(gray);
     cv::Mat1b scaled;
-    cv::resize(gray, scaled, scaled_here.working_size_px, 0, 0, cv::INTER_LINEAR_EXACT);
+    cv::resize(gray, scaled, scaled_here.working_size_px, 0, 0, interpolation);
     const Features expected =
         extract_surf(scaled, {.working_area_px = static_cast<int>(scaled.total())});
     ASSERT_EQ(expected.working_size_px, scaled_here.working_size_px);

@@ -95,6 +95,32 @@ cv::Mat1b textured_image(cv::Size size, int scene) {
   return image;
 }
 
+cv::Mat1b area_means(const cv::Mat1b& gray, cv::Size size) {
+  // One row a part, one column a pixel.
+  const auto shares_of = [](int parts, int pixels) {
+    cv::Mat1d shares(parts, pixels);
+    const double side = static_cast<double>(pixels) / parts;
+    for (int part = 0; part < parts; ++part) {
+      for (int pixel = 0; pixel < pixels; ++pixel) {
+        const double share =
+            std::min(pixel + 1.0, (part + 1) * side) - std::max(double(pixel), part * side);
+        shares(part, pixel) = std::max(0.0, share) / side;
+      }
+    }
+    return shares;
+  };
+  cv::Mat1d pixels;
+  gray.convertTo(pixels, CV_64F);
+  cv::Mat1d sums;
+  cv::gemm(shares_of(size.height, gray.rows) * pixels, shares_of(size.width, gray.cols), 1,
+           cv::noArray(), 0, sums, cv::GEMM_2_T);
+  cv::Mat1b means(size);
+  // Halves go up; a little more makes up for the rounding of doubles.
+  std::transform(sums.begin(), sums.end(), means.begin(),
+                 [](double sum) { return static_cast<std::uint8_t>(sum + 0.5 + 1e-9); });
+  return means;
+}
+
 cv::Mat1b view(int scene, cv::Point moved_px) {
   constexpr int kMarginPx = 40;
   const cv::Mat1b all = textured_image({320 + 2 * kMarginPx, 240 + 2 * kMarginPx}, scene);

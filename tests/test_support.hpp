@@ -60,6 +60,10 @@ BinaryContent full_content();
 /// `scene` is another picture; the same one is the same on every machine.
 cv::Mat1b textured_image(cv::Size size, int scene);
 
+/// The mean grey level of each of size.width x size.height equal parts of an image, by the share of
+/// every pixel in it.
+cv::Mat1b area_means(const cv::Mat1b& gray, cv::Size size);
+
 /// A camera's 320 x 240 view of `scene` from a spot `moved_px` beside the usual one, at most 40 px.
 cv::Mat1b view(int scene, cv::Point moved_px = {0, 0});
 

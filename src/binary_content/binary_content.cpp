@@ -10,7 +10,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/image_shrinker.hpp"
 
 namespace loopbit {
 namespace {
@@ -19,57 +19,15 @@ namespace {
 /// rounding noise, not structure: it has no phase worth keeping.
 constexpr float kNoiseAmplitude = 1.0F;
 
-/// Of a row of numbers for pixels, cumulated, the sum up to any 64th of a pixel.
-class RowSum {
- public:
-  explicit RowSum(std::size_t size) : up_to_(size + 1, 0) {}
-
-  void load(const std::vector<std::uint32_t>& row) {
-    for (std::size_t x = 0; x < row.size(); ++x) up_to_[x + 1] = up_to_[x] + row[x];
-  }
-
-  /// 64 times the sum of the first `end` / 64 numbers.
-  [[nodiscard]] std::uint64_t operator()(std::size_t end) const {
-    const std::size_t x = end / kContentSide;
-    const std::size_t part = end % kContentSide;
-    return kContentSide * up_to_[x] + (part == 0 ? 0 : part * (up_to_[x + 1] - up_to_[x]));
-  }
-
- private:
-  std::vector<std::uint64_t> up_to_;
-};
-
-/// Means over the 64 x 64 cells of the map, in whole grey levels. In units of 1/64 px a pixel is 64
-/// long, and a cell as long as the image has pixels: so all is whole numbers.
-cv::Mat1f shrink_to_map(const cv::Mat1b& gray) {
-  const auto width = static_cast<std::size_t>(gray.cols);
-  const double area = static_cast<double>(gray.cols) * gray.rows;
-  std::vector<std::uint32_t> sums(width, 0);  // of the pixels above each other in a row of cells
-  RowSum row_sum(width);
-  cv::Mat1f map(kContentSide, kContentSide);
-  for (int y = 0; y < gray.rows; ++y) {
-    const int cell_y = kContentSide * y / gray.rows;
-    const int left_of_cell = (cell_y + 1) * gray.rows - kContentSide * y;
-    const int share = std::min(kContentSide, left_of_cell);
-    active_kernels().add_pixels(gray[y], width, static_cast<std::uint16_t>(share), sums.data());
-    if (left_of_cell > kContentSide) continue;
-    row_sum.load(sums);
-    for (std::size_t cell_x = 0; cell_x < kContentSide; ++cell_x) {
-      const std::uint64_t sum = row_sum((cell_x + 1) * width) - row_sum(cell_x * width);
-      const auto mean = std::lround(static_cast<double>(sum) / area);
-      map(cell_y, static_cast<int>(cell_x)) = static_cast<float>(mean);
-    }
-    std::fill(sums.begin(), sums.end(), 0U);
-    const auto rest = static_cast<std::uint16_t>(kContentSide - share);
-    active_kernels().add_pixels(gray[y], width, rest, sums.data());
-  }
-  return map;
-}
-
+/// In whole grey levels.
 cv::Mat1f resize_to_map(const cv::Mat1b& gray) {
-  if (gray.cols >= kContentSide && gray.rows >= kContentSide) return shrink_to_map(gray);
+  const cv::Size size(kContentSide, kContentSide);
   cv::Mat1b small;
-  cv::resize(gray, small, {kContentSide, kContentSide}, 0, 0, cv::INTER_LINEAR_EXACT);
+  if (gray.cols >= kContentSide && gray.rows >= kContentSide) {
+    ImageShrinker().shrink(gray, size, small);
+  } else {
+    cv::resize(gray, small, size, 0, 0, cv::INTER_LINEAR_EXACT);
+  }
   cv::Mat1f map;
   small.convertTo(map, CV_32F);
   return map;

@@ -9,7 +9,7 @@
 #include <tuple>
 #include <vector>
 
-#include <opencv2/imgproc.hpp>
+#include "loopbit/image_shrinker.hpp"
 
 #include "hessian_pyramid.hpp"
 #include "integral_image.hpp"
@@ -57,7 +57,8 @@ bool stronger(const Maximum& a, const Maximum& b) {
 
 class SurfExtractor::Impl {
  public:
-  Impl(const SurfOptions& options, const Kernels& kernels) : options_(options), kernels_(kernels) {
+  Impl(const SurfOptions& options, const Kernels& kernels)
+      : options_(options), kernels_(kernels), shrinker_(kernels) {
     validate(options, "surf");
   }
 
@@ -81,7 +82,7 @@ class SurfExtractor::Impl {
                         std::max(1, cvRound(gray.rows * factor)));
     if (size == gray.size()) return gray;
     if (factor < kLeastLinearFactor) {
-      cv::resize(gray, working_, size, 0, 0, cv::INTER_AREA);
+      shrinker_.shrink(gray, size, working_);
     } else {
       interpolate(gray, size);
     }
@@ -224,6 +225,7 @@ class SurfExtractor::Impl {
 
   SurfOptions options_;
   const Kernels& kernels_;
+  ImageShrinker shrinker_;
   cv::Mat1b working_;
   cv::Mat1b smoothed_;
   std::vector<unsigned> down_sums_;
