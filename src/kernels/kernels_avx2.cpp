@@ -119,28 +119,31 @@ void lay_side_by_side(const std::int8_t* descriptors, Lanes& lanes) {
   lanes.is_irregular = _mm256_or_si256(too_long, _mm256_xor_si256(none, _mm256_set1_epi32(-1)));
 }
 
+/// The constants of 8 descriptors, of which the first is number `first` of all.
+__m256i constants_of_8(const std::int8_t* descriptors, std::size_t first) {
+  Lanes lanes;
+  lay_side_by_side(descriptors, lanes);
+  const __m256i numbers =
+      _mm256_add_epi32(_mm256_set1_epi32(static_cast<std::int32_t>(first % kNumbers)),
+                       _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+  const __m256i flags = _mm256_and_si256(lanes.is_irregular, _mm256_set1_epi32(kIrregular));
+  const __m256i squares = _mm256_slli_epi32(lanes.squares, kNumberBits);
+  return _mm256_or_si256(_mm256_or_si256(squares, numbers), flags);
+}
+
 void describe_constants(const std::int8_t* descriptors, std::size_t num_descriptors,
                         std::int32_t* constants) {
-  for (std::size_t i = 0; i < num_descriptors; i += kLanes) {
-    alignas(32) std::int32_t numbered[kLanes];
-    const std::size_t count = num_descriptors - i < kLanes ? num_descriptors - i : kLanes;
-    std::int8_t last[kLanes * kDescriptorSize] = {};
-    const std::int8_t* first = descriptors + i * kDescriptorSize;
-    if (count < kLanes) {
-      __builtin_memcpy(last, first, count * kDescriptorSize);
-      first = last;
-    }
-    Lanes lanes;
-    lay_side_by_side(first, lanes);
-    const __m256i numbers =
-        _mm256_add_epi32(_mm256_set1_epi32(static_cast<std::int32_t>(i % kNumbers)),
-                         _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
-    const __m256i flags = _mm256_and_si256(lanes.is_irregular, _mm256_set1_epi32(kIrregular));
-    const __m256i squares = _mm256_slli_epi32(lanes.squares, kNumberBits);
-    _mm256_store_si256(reinterpret_cast<__m256i*>(numbered),
-                       _mm256_or_si256(_mm256_or_si256(squares, numbers), flags));
-    __builtin_memcpy(constants + i, numbered, count * sizeof *numbered);
+  std::size_t i = 0;
+  for (; i + kLanes <= num_descriptors; i += kLanes) {
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(constants + i),
+                        constants_of_8(descriptors + i * kDescriptorSize, i));
   }
+  if (i == num_descriptors) return;
+  std::int8_t last[kLanes * kDescriptorSize] = {};
+  __builtin_memcpy(last, descriptors + i * kDescriptorSize,
+                   (num_descriptors - i) * kDescriptorSize);
+  const __m256i of_last = constants_of_8(last, i);
+  __builtin_memcpy(constants + i, &of_last, (num_descriptors - i) * sizeof *constants);
 }
 
 /// The two smallest numbers offered to each lane.
