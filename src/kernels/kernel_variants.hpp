@@ -27,7 +27,7 @@ extern const Kernels kScalarKernels;
 extern const Kernels kAvx2Kernels;    ///< needs AVX2
 extern const Kernels kAvx512Kernels;  ///< needs AVX-512 F, BW, DQ, VL, VNNI and VPOPCNTDQ
 #elif defined(__aarch64__)
-extern const Kernels kDotprodKernels;  ///< needs the dot product extension, of Armv8.2-A
+extern const Kernels kDotprodKernels;  ///< needs Armv8.2-A and the dot product extension
 #endif
 
 }  // namespace loopbit

@@ -257,10 +257,10 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   lay_side_by_side(descriptors, halves[0]);
   lay_side_by_side(descriptors + kLanes * kDescriptorSize, halves[1]);
   const bool regular = are_regular(halves, constants, num_others);
+  const auto search = regular ? nearest_two_of_run<true> : nearest_two_of_run<false>;
   NearestOfHalf found[2];
   for (std::size_t begin = 0; begin < num_others; begin += kNumbers) {
     const std::size_t count = num_others - begin < kNumbers ? num_others - begin : kNumbers;
-    const auto search = regular ? nearest_two_of_run<true> : nearest_two_of_run<false>;
     SmallestTwo run[2];
     search(halves, others + begin * kDescriptorSize, constants + begin, count, run);
     found[0].offer_run(run[0], halves[0].squares, begin);
