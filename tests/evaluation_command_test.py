@@ -360,6 +360,32 @@ class EvaluationCommandTest(CommandTest):
         record = json.loads((self.out / "citycentre" / "run.json").read_text())
         self.assertEqual((record["counts"]["frames"], record["input"]["every"]), (12, 2))
 
+    def test_a_matrix_of_left_images_only_may_be_given_again(self):
+        data = self.public_data()
+        images = data / "City_Centre" / "Images"
+        matrix = data / "City_Centre" / "CityCentreGroundTruth.mat"
+        write_mat(matrix, "truth", 12, [(4, 1), (5, 1), (11, 0)])
+        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        run = self.out / "citycentre"
+        expected = self.score(run)
+        self.assertEqual(expected["positives"], 3)
+        self.assertEqual(self.score(run, "--truth", matrix), expected)
+        both = self.scratch / "both.mat"
+        write_mat(both, "truth", 24, [(9, 3), (10, 3), (22, 1)])
+        self.assertEqual(self.score(run, "--truth", both, "--truth-views", 2), expected)
+        plain = self.scratch / "plain"
+        ran = loopbit("run", images, "--every", 2, "--out", plain, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        for runs in ((run, plain), (plain, run)):
+            compared = loopbit("compare", *runs, "--truth", matrix, "--json")
+            self.assertEqual(compared.returncode, 0, compared.stderr)
+            self.assertEqual([row["positives"] for row in json.loads(compared.stdout)], [3, 3])
+        loops = (run / "loops.csv").read_text().splitlines(keepends=True)
+        (run / "loops.csv").write_text("".join(loops[:7]))  # as of a run that was killed
+        self.assertEqual(self.score(run)["positives"], 2)
+        self.assertEqual(self.score(run, "--truth", matrix), self.score(run))
+
     def test_no_public_data_at_all(self):
         empty = self.scratch / "empty"
         empty.mkdir()

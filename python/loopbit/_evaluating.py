@@ -155,7 +155,9 @@ def recorded_scoring(run: FinishedRun) -> tuple[int, str]:
 
 
 def _every(run: FinishedRun) -> int:
-    every: int = _record(run).get("input", {}).get("every", 1)
+    """Of the frames that files of truth count, every so-many-th was read."""
+    read = _record(run).get("input", {})
+    every: int = read.get("every", 1) // read.get("views", 1)
     return every
 
 

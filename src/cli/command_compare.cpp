@@ -74,7 +74,10 @@ FramesRead share_frames(std::vector<ListedRun>& runs) {
     }
   }
   FramesRead frames = known->frames;
-  for (ListedRun& run : runs) run.run.list.times_s = frames.times_s;
+  for (ListedRun& run : runs) {
+    run.run.list.times_s = frames.times_s;
+    frames.views = std::max(frames.views, run.frames.views);  // the images are the same
+  }
   return frames;
 }
 

@@ -51,6 +51,7 @@ constexpr std::array kPaper{
 struct PublicSet {
   std::string images;
   int every = 1;
+  int views = 1;  ///< see RunRecord::views
   TruthFlags truth;
 };
 
@@ -125,7 +126,7 @@ std::optional<PublicSet> find_fab_map_set(const fs::path& data, std::string_view
     const auto truth = set.truth.read_truth({}, 1);
     int rows = 0;
     for (const PlaceRun& run : truth->same_place) rows = std::max(rows, run.query + 1);
-    if (static_cast<std::size_t>(rows) * 2 <= images) set.every = 2;
+    if (static_cast<std::size_t>(rows) * 2 <= images) set.every = set.views = 2;
     return set;
   }
   return std::nullopt;
@@ -146,8 +147,9 @@ int run_set(const PublicSet& set, const SessionFlags& flags, const Arguments& ar
   session.truth_files = set.truth.files();
   session.truth_description = set.truth.description();
   session.every = set.every;
+  session.views = set.views;
   session.evaluation = set.truth.evaluation();
-  // The matrix is in the numbers of the images that are read.
+  // Every frame that the truth counts is read.
   session.truth = [&](const FrameTimes& times_s) { return set.truth.read_truth(times_s, 1); };
   session.positions = [&](const FrameTimes& times_s) {
     return set.truth.read_positions(times_s, 1);

@@ -73,6 +73,7 @@ ListedRun listed_run(const std::string& text) {
     run.evaluation.tolerance_frames = value_at(record, "/score/tolerance_frames", 0);
     run.evaluation.protocol = value_at(record, "/score/protocol", std::string());
     listed.frames.every = std::max(1, value_at(record, "/input/every", 1));
+    listed.frames.views = std::max(1, value_at(record, "/input/views", 1));
   } else {
     run.list = read_match_list(path);
   }
@@ -81,11 +82,12 @@ ListedRun listed_run(const std::string& text) {
 }
 
 void take_truth(ReportRun& run, const TruthFlags& flags, const FramesRead& frames) {
-  if (auto positions = flags.read_positions(frames.times_s, frames.every); !positions.empty()) {
+  const int every = frames.every_counted();
+  if (auto positions = flags.read_positions(frames.times_s, every); !positions.empty()) {
     run.positions_m = std::move(positions);
   }
   if (flags.given()) {
-    run.truth = flags.read_truth(frames.times_s, frames.every);
+    run.truth = flags.read_truth(frames.times_s, every);
     run.evaluation = flags.evaluation();
   }
 }

@@ -169,6 +169,7 @@ int run_session(Session session, const SessionFlags& flags) {
                         .description = session.source->description(),
                         .options = flags.detector_options(),
                         .every = session.every,
+                        .views = session.views,
                         .limit = session.limit,
                         .threads = threads,
                         .map_path = flags.map,

@@ -118,6 +118,18 @@ def test_truth_of_the_frames_read(dataset, world, tmp_path):
     assert loopbit.evaluate(run, same).decision.right == loopbit.evaluate(run).decision.right
 
 
+def test_truth_may_count_two_images_as_one_frame(dataset, tmp_path):
+    run = loopbit.run_folder(loopbit.open_source(dataset / "images", every=2), tmp_path / "run",
+                             evidence=False)
+    record = json.loads(run.record_json)
+    record["input"]["views"] = 2
+    (tmp_path / "run" / "run.json").write_text(json.dumps(record))
+    (tmp_path / "left.csv").write_text("30,2\n31,2\n")
+    assert loopbit.evaluate(run, tmp_path / "left.csv").decision.positives == 1
+    left = loopbit.evaluate(tmp_path / "run", tmp_path / "left.csv").decision
+    assert left.positives == 2
+
+
 def test_frames_that_nobody_knows():
     truth = loopbit.GroundTruth([[10, 0, 2], [12, 4, 4]], unknown=[5, 12])
     assert truth.unknown.tolist() == [5, 12] and truth.every == 1 and "unknown=2" in repr(truth)

@@ -28,6 +28,7 @@ struct RunRecord {
   std::string description;  ///< of the input, see ImageSource
   LoopDetectorOptions options;
   int every = 1;  ///< of the input's frames, every so-many-th was read
+  int views = 1;  ///< so many of them in turn are one frame for files of truth (2: left, right)
   int limit = 0;  ///< at most so many were read; 0 = all
   int threads = 1;
   int map_session = 0;        ///< of this run, where there is a map
