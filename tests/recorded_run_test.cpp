@@ -4,8 +4,10 @@
 
 #include <atomic>
 #include <filesystem>
+#include <memory>
 
 #include "loopbit/finished_run.hpp"
+#include "loopbit/provable_source.hpp"
 
 #include "map_support.hpp"
 #include "test_support.hpp"
@@ -127,6 +129,60 @@ TEST_F(RecordedRunTest, WhatRefusesARunCostsNoEarlierOne) {
   EXPECT_TRUE(fs::exists(path("run/loops.csv")));
   test::expect_error(ErrorKind::option, {"folder or a map"},
                      [&] { const RecordedRun run(record(), {}); });
+}
+
+/// Frames that no one can read, before three views or none.
+class BadBegin final : public ImageSource {
+ public:
+  explicit BadBegin(bool has_views) : has_views_(has_views) {}
+
+  bool next(Frame& frame) override {
+    if (bad_-- <= 0) return has_views_ && views_.next(frame);
+    frame = {.name = "bad", .timestamp_s = {}, .image = {}, .error = "It is no image."};
+    return true;
+  }
+  bool skip() override { return bad_-- > 0 || (has_views_ && views_.skip()); }
+  [[nodiscard]] std::optional<std::size_t> size() const override { return std::nullopt; }
+  [[nodiscard]] std::string description() const override { return "a bad beginning"; }
+
+ private:
+  bool has_views_;
+  int bad_ = 2;
+  ThreeViews views_;
+};
+
+TEST_F(RecordedRunTest, ARunWithoutAReadableFrameIsRefusedWhenItHasEnded) {
+  BadBegin source(false);
+  RecordedRun recorded(record("town.db"), {path("run")});
+  test::expect_error(ErrorKind::input, {"None of the 2 frames", "'views'"},
+                     [&] { recorded.detect(source, nobody(), false, kNeverStop); });
+  EXPECT_EQ(read_run(path("run")).detections.size(), 2U);
+  const MapWriter next(path("town.db"), test::fast_options(), "next");
+  BadBegin stopped(false);
+  RecordedRun other(record(), {path("other")});
+  const std::atomic<bool> stop{true};
+  other.detect(stopped, nobody(), false, stop);
+}
+
+TEST_F(RecordedRunTest, AProvenSourceGivesTheSameFrames) {
+  ProvableSource source(std::make_unique<BadBegin>(true));
+  source.prove("views");
+  source.prove("views");
+  Frame frame;
+  EXPECT_TRUE(source.next(frame));
+  EXPECT_EQ(frame.error, "It is no image.");
+  EXPECT_TRUE(source.skip());
+  for (int i = 0; i < kFrames; ++i) {
+    ASSERT_TRUE(source.next(frame));
+    EXPECT_FALSE(frame.image.empty());
+  }
+  EXPECT_FALSE(source.next(frame));
+  EXPECT_FALSE(source.skip());
+  ProvableSource bad(std::make_unique<BadBegin>(false));
+  for (int i = 0; i < 2; ++i) {
+    test::expect_error(ErrorKind::input, {"None of the 2 frames of 'views'", "It is no image."},
+                       [&] { bad.prove("views"); });
+  }
 }
 
 }  // namespace

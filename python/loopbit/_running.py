@@ -114,7 +114,8 @@ def run_folder(
     sequence, whatever part of it is read. A protocol needs the truth's path.
 
     What is wrong with an argument is told before the first frame, where it can be. What turns out
-    to be wrong with truth or positions when the run has ended leaves it without them.
+    to be wrong with truth or positions when the run has ended leaves it without them. An input none
+    of whose frames can be read is an InputError, and overwrite does not replace a run by it.
     """
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "loopbit/image_source.hpp"
+#include "loopbit/provable_source.hpp"
 
 namespace loopbit::python {
 
@@ -25,24 +26,29 @@ class SharedSource : public ImageSource {
   // These must be called without the GIL: see SharedDetector.
   bool next(Frame& frame) override {
     const std::scoped_lock lock(mutex_);
-    return counted(source_->next(frame));
+    return counted(source_.next(frame));
   }
   bool skip() override {
     const std::scoped_lock lock(mutex_);
-    return counted(source_->skip());
+    return counted(source_.skip());
+  }
+  /// See ProvableSource.
+  void prove() {
+    const std::scoped_lock lock(mutex_);
+    source_.prove(input_);
   }
 
   /// How many frames are still to come, where that is sure: a video says about how many.
   [[nodiscard]] std::optional<std::size_t> frames_left() {
     const std::scoped_lock lock(mutex_);
     std::error_code error;
-    const auto frames = source_->size();
+    const auto frames = source_.size();
     if (!frames || !std::filesystem::is_directory(input_, error)) return std::nullopt;
     return *frames - taken_;
   }
 
-  [[nodiscard]] std::optional<std::size_t> size() const override { return source_->size(); }
-  [[nodiscard]] std::string description() const override { return source_->description(); }
+  [[nodiscard]] std::optional<std::size_t> size() const override { return source_.size(); }
+  [[nodiscard]] std::string description() const override { return source_.description(); }
   [[nodiscard]] const std::string& input() const { return input_; }
   [[nodiscard]] int every() const { return every_; }
   [[nodiscard]] int limit() const { return limit_; }
@@ -58,7 +64,7 @@ class SharedSource : public ImageSource {
   int limit_;
   std::mutex mutex_;
   std::size_t taken_ = 0;
-  std::unique_ptr<ImageSource> source_;
+  ProvableSource source_;
 };
 
 }  // namespace loopbit::python

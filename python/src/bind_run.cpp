@@ -97,9 +97,10 @@ void keep_positions(RecordedRun& recorded, const Positions& positions_m) {
 /// For the package's run_folder(), as loopbit run uses RecordedRun.
 void bind_recorded_run(py::module_& module) {
   py::class_<RecordedRun>(module, "_RecordedRun")
-      .def(py::init([](const SharedSource& source, const Path& out,
-                       const LoopDetectorOptions& options, const Path& map, bool overwrite,
-                       bool keep_images, const Path& truth, const Path& poses) {
+      .def(py::init([](SharedSource& source, const Path& out, const LoopDetectorOptions& options,
+                       const Path& map, bool overwrite, bool keep_images, const Path& truth,
+                       const Path& poses) {
+             if (overwrite) source.prove();
              return std::make_unique<RecordedRun>(
                  record_of(source, options, map.string(), truth.string()),
                  RunOutput{.folder = out.string(),

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <deque>
 #include <thread>
 #include <utility>
 
@@ -13,6 +12,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/finished_run.hpp"
+#include "loopbit/provable_source.hpp"
 #include "loopbit/recorded_run.hpp"
 
 #include "commands.hpp"
@@ -32,53 +32,6 @@ constexpr std::size_t kFramesReadAhead = 8;
 int thread_count(int wanted) {
   return wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
-
-void check_readable(const std::vector<Detection>& detections, const std::string& input) {
-  const bool none = std::all_of(detections.begin(), detections.end(),
-                                [](const Detection& d) { return d.status == Status::unreadable; });
-  if (none) {
-    throw Error(ErrorKind::input,
-                fmt::format("None of the {} frames of '{}' could be read; see the "
-                            "messages above.",
-                            detections.size(), input));
-  }
-}
-
-/// A source that is known to have a frame that can be read.
-class ProvenSource final : public ImageSource {
- public:
-  /// Throws Error (kind input) if there is none.
-  ProvenSource(std::unique_ptr<ImageSource> source, const std::string& input)
-      : source_(std::move(source)) {
-    for (Frame frame; source_->next(frame); frame = {}) {
-      first_.push_back(frame);
-      if (frame.error.empty()) return;
-    }
-    throw Error(ErrorKind::input,
-                fmt::format("None of the {} frames of '{}' could be read, so no earlier run is "
-                            "replaced. {}",
-                            first_.size(), input, first_.empty() ? "" : first_.front().error));
-  }
-
-  bool next(Frame& frame) override {
-    if (first_.empty()) return source_->next(frame);
-    frame = std::move(first_.front());
-    first_.pop_front();
-    return true;
-  }
-
-  bool skip() override {
-    Frame frame;
-    return next(frame);
-  }
-
-  [[nodiscard]] std::optional<std::size_t> size() const override { return source_->size(); }
-  [[nodiscard]] std::string description() const override { return source_->description(); }
-
- private:
-  std::unique_ptr<ImageSource> source_;
-  std::deque<Frame> first_;  ///< read, and not given yet
-};
 
 void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
            const std::atomic<bool>& stop) {
@@ -163,7 +116,9 @@ int run_session(Session session, const SessionFlags& flags) {
   std::vector<std::string> inputs = session.truth_files;
   inputs.insert(inputs.end(), {session.input, flags.config});
   if (flags.overwrite) {
-    session.source = std::make_unique<ProvenSource>(std::move(session.source), session.input);
+    auto provable = std::make_unique<ProvableSource>(std::move(session.source));
+    provable->prove(session.input);
+    session.source = std::move(provable);
   }
   RecordedRun recorded({.input = session.input,
                         .description = session.source->description(),
@@ -181,7 +136,6 @@ int run_session(Session session, const SessionFlags& flags) {
   try {
     drive(*session.source, recorded, !flags.no_report, stop_requested);
     warn_of_damage(flags.map, recorded.map_damage());
-    if (!stop_requested) check_readable(recorded.folder().detections(), session.input);
   } catch (const Error& error) {
     try {
       recorded.finish(error.what());

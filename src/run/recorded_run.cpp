@@ -54,14 +54,17 @@ std::string folder_of(const RunRecord& record, const std::string& out) {
   return fmt::format("{}_session_{}", stem, record.map_session);
 }
 
+bool are_unreadable(const std::vector<Detection>& detections) {
+  return std::all_of(detections.begin(), detections.end(),
+                     [](const Detection& d) { return d.status == Status::unreadable; });
+}
+
 /// Whether a run ended in `folder` before any frame was answered.
 bool is_unanswered(const std::string& folder) {
   const auto loops = std::filesystem::path(folder) / kLoopsFile;
   if (!is_there(loops)) return false;
   try {
-    const auto detections = read_detections(loops.string());
-    return std::all_of(detections.begin(), detections.end(),
-                       [](const Detection& d) { return d.status == Status::unreadable; });
+    return are_unreadable(read_detections(loops.string()));
   } catch (const Error&) {  // no run of ours
     return false;
   }
@@ -113,6 +116,12 @@ void RecordedRun::detect(ImageSource& source, const RunListener& listener, bool 
   if (map) map_damage_ = map->damage();
   if (evidence) evidence->finish();
   if (map) map->finish();
+  const std::vector<Detection>& detections = folder_.detections();
+  if (!stop && are_unreadable(detections)) {
+    throw Error(ErrorKind::input, fmt::format("None of the {} frames of '{}' could be read; the "
+                                              "messages about them say why.",
+                                              detections.size(), record_.input));
+  }
 }
 
 void RecordedRun::keep_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m) {

@@ -81,6 +81,35 @@ def test_a_run_that_is_stopped_keeps_what_it_found(tmp_path, dataset, error, sto
     loopbit.run_folder(folder, tmp_path / "run", overwrite=True, on_bad_frame=lambda _: None)
 
 
+def test_a_run_without_a_readable_frame_is_refused(tmp_path, dataset):
+    bad, good = tmp_path / "bad", tmp_path / "good"
+    for folder in (bad, good):
+        folder.mkdir()
+        (folder / "0.png").write_bytes(b"no image")
+    (good / "1.png").write_bytes((dataset / "images" / "000000.png").read_bytes())
+    told = []
+    with pytest.raises(loopbit.InputError, match="None of the 1 frames of .*bad"):
+        loopbit.run_folder(bad, tmp_path / "run", on_bad_frame=told.append)
+    assert len(told) == 1 and "0.png" in told[0]
+    assert "None of" in json.loads((tmp_path / "run" / "run.json").read_text())["stopped_by"]
+    run = loopbit.run_folder(good, tmp_path / "run", overwrite=True, on_bad_frame=told.append)
+    assert [d.status.name for d in run.detections] == ["unreadable", "no_earlier_place"]
+    before = decisions(run.path)
+    with pytest.raises(loopbit.InputError, match="no earlier run is replaced"):
+        loopbit.run_folder(bad, tmp_path / "run", overwrite=True, on_bad_frame=told.append)
+    assert decisions(run.path) == before and len(before) == 2
+
+
+def test_a_source_that_was_refused_is_refused_again(tmp_path):
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "0.png").write_bytes(b"no image")
+    source = loopbit.open_source(tmp_path / "bad")
+    for _ in range(2):
+        with pytest.raises(loopbit.InputError, match="None of the 1 frames"):
+            loopbit.run_folder(source, tmp_path / "run", overwrite=True)
+    assert next(source).name == "0.png" and source.size() == 1
+
+
 @pytest.mark.parametrize("every", [2, 3])
 @pytest.mark.parametrize("file, flags, arguments", [
     ("truth.csv", [], {}), ("poses.txt", ["--protocol", "kitti"], {"protocol": "kitti"})])

@@ -39,7 +39,8 @@ class RecordedRun {
 
   /// Runs over `source`, once, as run() does, with `listener` told of each frame after it is kept.
   /// The map is saved and closed, also where the run fails. `keep_evidence`: for write_report().
-  /// Throws what run() throws, and Error (kind output) where something cannot be kept.
+  /// Throws what run() throws, Error (kind output) where something cannot be kept, and Error (kind
+  /// input) where the source has ended and no frame was readable.
   void detect(ImageSource& source, const RunListener& listener, bool keep_evidence,
               const std::atomic<bool>& stop);
 
