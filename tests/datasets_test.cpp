@@ -527,6 +527,16 @@ TEST_F(Datasets, CutOffVideoEndsEarly) {
   EXPECT_LT(frames, kFrames);
 }
 
+TEST_F(Datasets, TheNumberOfFramesOfAFolderIsSureAndThatOfAVideoIsNot) {
+  write_images({"images/0.png", "images/1.png", "images/2.png"});
+  write_video("v.avi", 4);
+  const auto every_second = subsample(open_source(path("images")), 2, 0);
+  EXPECT_EQ(exact_size(*every_second, path("images")), 2U);
+  const auto video = open_source(path("v.avi"));
+  EXPECT_EQ(video->size(), 4U);
+  EXPECT_EQ(exact_size(*video, path("v.avi")), std::nullopt);
+}
+
 // Every n-th frame
 
 TEST_F(Datasets, SubsampleTakesEveryNthUpToTheLimit) {

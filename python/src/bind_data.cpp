@@ -3,6 +3,7 @@
 #include "bind_data.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 #include <vector>
 
@@ -113,12 +114,6 @@ std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {
   return runs;
 }
 
-int checked_every(int every) {
-  if (every >= 1) return every;
-  throw Error(ErrorKind::option,
-              fmt::format("every is {}, but must be 1 (all frames) or more.", every));
-}
-
 void bind_truth(py::module_& module) {
   py::class_<GroundTruth>(module, "GroundTruth",
                           "What is true about a sequence, in the numbers of all its frames: "
@@ -126,12 +121,13 @@ void bind_truth(py::module_& module) {
                           "last show what frame query shows.")
       .def(py::init([](const ArrayLike& same_place, const ArrayLike& near_place,
                        const ArrayLike& ignored, const ArrayLike& unknown, int every) {
+             check_every(every);
              GroundTruth truth;
              truth.same_place = to_runs(same_place, "same_place");
              truth.near_place = to_runs(near_place, "near_place");
              truth.ignored = to_frames(ignored, "ignored");
              truth.unknown = to_frames(unknown, "unknown");
-             truth.every = checked_every(every);
+             truth.every = every;
              return truth;
            }),
            py::arg("same_place"), py::arg("near_place") = py::tuple(),

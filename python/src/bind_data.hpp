@@ -2,12 +2,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <system_error>
 #include <utility>
 
 #include "loopbit/image_source.hpp"
@@ -38,13 +36,11 @@ class SharedSource : public ImageSource {
     source_.prove(input_);
   }
 
-  /// How many frames are still to come, where that is sure: a video says about how many.
+  /// How many frames are still to come, where that is sure.
   [[nodiscard]] std::optional<std::size_t> frames_left() {
     const std::scoped_lock lock(mutex_);
-    std::error_code error;
-    const auto frames = source_.size();
-    if (!frames || !std::filesystem::is_directory(input_, error)) return std::nullopt;
-    return *frames - taken_;
+    const auto frames = exact_size(source_, input_);
+    return frames ? std::optional(*frames - taken_) : std::nullopt;
   }
 
   [[nodiscard]] std::optional<std::size_t> size() const override { return source_.size(); }

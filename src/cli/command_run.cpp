@@ -1,9 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include <filesystem>
 #include <memory>
-#include <optional>
-#include <system_error>
 #include <utility>
 
 #include "loopbit/error.hpp"
@@ -23,13 +20,6 @@ struct RunFlags {
   TruthFlags truth;
 };
 
-/// How many frames of `input` will be read, where that is sure: a video says about how many.
-std::optional<std::size_t> known_frames(const std::string& input, const ImageSource& source) {
-  std::error_code error;
-  const bool is_folder = std::filesystem::is_directory(input, error);
-  return is_folder ? source.size() : std::nullopt;
-}
-
 int run_command(const RunFlags& flags, const Arguments& arguments) {
   Session session;
   if (flags.session.out.empty() && flags.session.map.empty()) {
@@ -37,7 +27,7 @@ int run_command(const RunFlags& flags, const Arguments& arguments) {
   }
   session.source = subsample(open_source(flags.input), static_cast<std::size_t>(flags.every),
                              static_cast<std::size_t>(flags.limit));
-  flags.truth.check(flags.every, known_frames(flags.input, *session.source));
+  flags.truth.check(flags.every, exact_size(*session.source, flags.input));
   session.evaluation = flags.truth.evaluation();
   session.truth = [&](const FrameTimes& times_s) {
     return flags.truth.read_truth(times_s, flags.every);

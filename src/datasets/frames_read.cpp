@@ -8,12 +8,6 @@
 
 namespace loopbit::datasets {
 
-void check_every(int every) {
-  if (every >= 1) return;
-  throw Error(ErrorKind::option,
-              fmt::format("every is {}, but must be 1 (all frames) or more.", every));
-}
-
 void check_rows(const std::string& path, std::size_t rows, const char* things,
                 std::size_t frames_read, int every) {
   if (frames_read == 0) return;

@@ -7,13 +7,8 @@
 
 namespace loopbit::datasets {
 
-// Of a sequence every so-many-th frame was read.
-
-/// Throws Error (kind option) if `every` is less than 1.
-void check_every(int every);
-
 /// Throws Error (kind input) where `rows` of the file at `path`, one a frame of the whole sequence,
-/// end before the last of the frames read. `things`: what rows are.
+/// end before the last of the frames read, every so-many-th. `things`: what rows are.
 void check_rows(const std::string& path, std::size_t rows, const char* things,
                 std::size_t frames_read, int every);
 

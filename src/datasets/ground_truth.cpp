@@ -14,7 +14,6 @@
 #include "loopbit/write_file.hpp"
 
 #include "cells.hpp"
-#include "frames_read.hpp"
 #include "text_rows.hpp"
 
 namespace loopbit {
@@ -100,8 +99,14 @@ std::vector<int> read_frame_list(const std::string& path) {
   return list;
 }
 
+void check_every(int every) {
+  if (every >= 1) return;
+  throw Error(ErrorKind::option,
+              fmt::format("every is {}, but must be 1 (all frames) or more.", every));
+}
+
 GroundTruth every_nth(const GroundTruth& truth, int every) {
-  datasets::check_every(every);
+  check_every(every);
   return {.same_place = thinned(truth.same_place, every),
           .near_place = thinned(truth.near_place, every),
           .ignored = thinned(truth.ignored, every),

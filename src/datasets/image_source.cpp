@@ -111,4 +111,9 @@ std::unique_ptr<ImageSource> open_source(const std::string& input) {
   throw_no_input(input, "is neither a file nor a folder");
 }
 
+std::optional<std::size_t> exact_size(const ImageSource& source, const std::string& input) {
+  std::error_code error;
+  return fs::is_directory(input, error) ? source.size() : std::nullopt;
+}
+
 }  // namespace loopbit

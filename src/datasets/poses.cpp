@@ -115,7 +115,7 @@ bool have_times(const std::vector<CameraPose>& poses) {
 std::vector<std::optional<cv::Vec3d>> positions_by_row(const std::string& path,
                                                        const std::vector<CameraPose>& poses,
                                                        std::size_t frames, int every) {
-  datasets::check_every(every);
+  check_every(every);
   datasets::check_rows(path, poses.size(), "poses", frames, every);
   const auto step = static_cast<std::size_t>(every);
   std::vector<std::optional<cv::Vec3d>> positions_m;

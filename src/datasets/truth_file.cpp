@@ -176,7 +176,7 @@ GroundTruth read_truth(const std::string& path, const TruthOptions& options,
     throw Error(ErrorKind::option,
                 fmt::format("views is {}, but must be 1 (a row a frame) or more.", options.views));
   }
-  datasets::check_every(options.every);
+  check_every(options.every);
   if (static_cast<double>(times_s.size()) * options.every > std::numeric_limits<int>::max()) {
     throw Error(ErrorKind::option, fmt::format("every is {}, but no frame's number may be over {}.",
                                                options.every, std::numeric_limits<int>::max()));

@@ -36,9 +36,12 @@ std::vector<PlaceRun> read_place_runs(const std::string& path);
 /// Reads the frame that begins each row; what follows a comma is a remark. Errors as above.
 std::vector<int> read_frame_list(const std::string& path);
 
+/// Throws Error (kind option) if `every` is less than 1: see GroundTruth::every.
+void check_every(int every);
+
 /// What `truth`, of all frames, says of every `every`-th (1 = all), in the numbers of the frames
 /// read. A place none of whose frames was read is lost; GroundTruth::every loses nothing. Throws
-/// Error (kind option) if `every` is less than 1.
+/// as check_every() does.
 GroundTruth every_nth(const GroundTruth& truth, int every);
 
 /// Writes rows of `query,first,last` under a line of `comment`. Throws Error (kind output).

@@ -61,6 +61,10 @@ std::unique_ptr<ImageSource> open_source(const std::string& input);
 std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source, std::size_t every,
                                        std::size_t limit);
 
+/// How many frames `source`, opened from `input`, has in all, where that is sure: of a folder. A
+/// video says about how many.
+std::optional<std::size_t> exact_size(const ImageSource& source, const std::string& input);
+
 /// `source`, read ahead by a thread of its own, at most `depth` frames (at least 1). Frames and
 /// their order are the same; decoding overlaps with what is done with them. Throws Error (kind
 /// option) if `depth` is 0.
