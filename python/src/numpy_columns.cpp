@@ -74,7 +74,17 @@ std::vector<double> to_numbers(const ArrayLike& argument, const char* name) {
 }
 
 std::vector<bool> to_flags(const ArrayLike& argument, const char* name) {
-  return column_of(Values<bool>(array_of(argument, name, "b", "bool")), name);
+  const py::array array = array_of(argument, name, "biu", "bool, or integers 0 and 1");
+  const auto values = column_of(Values<std::int64_t>(array), name);
+  std::vector<bool> flags;
+  flags.reserve(values.size());
+  for (const std::int64_t value : values) {
+    if (value != 0 && value != 1) {
+      throw_bad_value(array, static_cast<py::ssize_t>(flags.size()), name, "0 or 1");
+    }
+    flags.push_back(value == 1);
+  }
+  return flags;
 }
 
 }  // namespace loopbit::python

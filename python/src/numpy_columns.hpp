@@ -27,7 +27,7 @@ FrameTable to_frame_table(const ArrayLike& argument, const char* name);
 std::vector<int> to_frames(const ArrayLike& argument, const char* name);
 /// Neither NaN nor infinite, one a row.
 std::vector<double> to_numbers(const ArrayLike& argument, const char* name);
-/// Truth values, one a row.
+/// Truth values, also as 0 and 1, one a row.
 std::vector<bool> to_flags(const ArrayLike& argument, const char* name);
 
 }  // namespace loopbit::python

@@ -55,7 +55,10 @@ def test_an_image_that_cannot_be_copied():
     (([1.5], [0]), TypeError, "query has dtype float64"),
     (([2, 3], ["0", "1"]), TypeError, "match has dtype <U1"),
     (([1], [0], ["high"]), TypeError, "score has dtype <U4"),
-    (([1], [0], [1], [1]), TypeError, "is_loop has dtype int64"),
+    (([1], [0], [1], [1.0]), TypeError, "is_loop has dtype float64, but must be bool, or integers"),
+    (([1, 2], [0, 0], [1, 1], [1, 2]), ValueError, "is_loop, row 1: 2 is not 0 or 1"),
+    (([1], [0], [1], [-1]), ValueError, "is_loop, row 0: -1 is not 0 or 1"),
+    (([1], [0], [1], [[1]]), ValueError, r"is_loop has shape \(1, 1\)"),
     (([3, HUGE], [0, 1]), ValueError, f"query, row 1: {HUGE} is not"),
     ((np.array([1 << 63], np.uint64), [0]), ValueError, f"query, row 0: {1 << 63} is not"),
     (([2, 3], [0, -1]), ValueError, "match, row 1: -1 is not"),
@@ -88,6 +91,9 @@ def test_whole_numbers_of_any_type_are_taken():
     for dtype in (np.int8, np.uint16, np.int64, np.uint64, ">i4"):
         found = loopbit.MatchList(np.array([7], dtype), np.array([5], dtype), np.array([1], dtype))
         assert found.matches.tolist() == [(7, 5, 1.0, True)]
+        flags = np.array([0, 1], dtype)
+        assert loopbit.MatchList([7, 8], [5, 5], [1, 1], flags).matches["is_loop"].tolist() == [
+            False, True]
     strided = np.arange(12).reshape(4, 3)[:, ::-1]
     assert loopbit.GroundTruth(strided[:, [0, 1]]).same_place["query"].tolist() == [2, 5, 8, 11]
     assert loopbit.GroundTruth(np.zeros((0, 3)), [], ()).same_place.size == 0
