@@ -5,18 +5,26 @@ import sys
 
 import loopbit
 
-map = loopbit.MapReader(sys.argv[1])
-detector = loopbit.LoopDetector(map=map)
-ranking = []
-for frame in loopbit.open_source(sys.argv[2]):
-    if frame.image is None:
-        continue
-    found = detector.query(frame.image, ranking=ranking)
-    if found.is_loop:
-        place = ranking[0].place
-        print(f"{frame.name} is frame {place.frame} of session {place.session}, "
-              f"score {ranking[0].score:g}")
-    else:
-        print(f"{frame.name} is not recognised: {found.status.name}")
-for clause in map.damage:
-    print(f"left out: {clause}", file=sys.stderr)
+
+def relocalise(path, images):
+    map = loopbit.MapReader(path)
+    detector = loopbit.LoopDetector(map=map)
+    ranking = []
+    for frame in loopbit.open_source(images):
+        if frame.image is None:
+            continue
+        found = detector.query(frame.image, ranking=ranking)
+        if found.is_loop:
+            place = ranking[0].place
+            print(f"{frame.name} is frame {place.frame} of session {place.session}, "
+                  f"score {ranking[0].score:g}")
+        else:
+            print(f"{frame.name} is not recognised: {found.status.name}")
+    for clause in map.damage:
+        print(f"left out: {clause}", file=sys.stderr)
+
+
+try:
+    relocalise(sys.argv[1], sys.argv[2])
+except (loopbit.Error, ValueError) as error:
+    sys.exit(str(error))

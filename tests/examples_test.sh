@@ -47,5 +47,12 @@ mkdir "$scratch/second_lap"
 cp "$scratch"/town/images/000{08,09,10,11,12,13,14}0.png "$scratch/second_lap"
 "$scratch/build/relocalise" "$scratch/town.db" "$scratch/second_lap" | tee "$scratch/places"
 "$python" "$examples/relocalise.py" "$scratch/town.db" "$scratch/second_lap" | cmp - "$scratch/places"
+# An image that is too small ends both, with one sentence.
+for relocalise in "$scratch/build/relocalise" "$python $examples/relocalise.py"; do
+  code=0
+  $relocalise "$scratch/town.db" "$scratch/odd" >"$scratch/places_before" 2>"$scratch/error" || code=$?
+  [[ $code == 1 && $(wc -l <"$scratch/places_before") == 3 ]]
+  [[ $(cat "$scratch/error") == *" 16 x 16 "*. && $(wc -l <"$scratch/error") == 1 ]]
+done
 asked=$("$prefix/bin/loopbit" query "$scratch/town.db" "$scratch/second_lap" --places 1)
 [[ $(grep -c ' is frame [0-9]* of session 1, score' "$scratch/places") == $(grep -c ' loop ' <<<"$asked") ]]
