@@ -75,8 +75,8 @@ __m256i unsigned_sum_of_parts(__m256i parts) {
 struct Lanes {
   __m256i bytes[kChunks];
   __m256i magnitudes[kChunks];
-  __m256i squares;       ///< of their lengths
-  __m256i is_irregular;  ///< all bits or none
+  __m256i squares;     ///< of their lengths
+  __m256i is_regular;  ///< all bits or none
 };
 
 /// Half of each of 8 descriptors.
@@ -115,8 +115,8 @@ void lay_side_by_side(const std::int8_t* descriptors, Lanes& lanes) {
     too_small = _mm256_or_si256(too_small, above);
   }
   const __m256i too_long = _mm256_cmpgt_epi32(lanes.squares, _mm256_set1_epi32(0xFFFF));
-  const __m256i none = _mm256_cmpeq_epi32(too_small, _mm256_setzero_si256());
-  lanes.is_irregular = _mm256_or_si256(too_long, _mm256_xor_si256(none, _mm256_set1_epi32(-1)));
+  const __m256i large_enough = _mm256_cmpeq_epi32(too_small, _mm256_setzero_si256());
+  lanes.is_regular = _mm256_andnot_si256(too_long, large_enough);
 }
 
 /// The constants of 8 descriptors, of which the first is number `first` of all.
@@ -126,7 +126,7 @@ __m256i constants_of_8(const std::int8_t* descriptors, std::size_t first) {
   const __m256i numbers =
       _mm256_add_epi32(_mm256_set1_epi32(static_cast<std::int32_t>(first % kNumbers)),
                        _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
-  const __m256i flags = _mm256_and_si256(lanes.is_irregular, _mm256_set1_epi32(kIrregular));
+  const __m256i flags = _mm256_andnot_si256(lanes.is_regular, _mm256_set1_epi32(kIrregular));
   const __m256i squares = _mm256_slli_epi32(lanes.squares, kNumberBits);
   return _mm256_or_si256(_mm256_or_si256(squares, numbers), flags);
 }
@@ -215,8 +215,8 @@ void nearest_two_of_run(const Lanes* halves, const std::int8_t* others,
 bool are_regular(const Lanes* halves, const std::int32_t* constants, std::size_t num_others) {
   std::int32_t any = 0;
   for (std::size_t i = 0; i < num_others; ++i) any |= constants[i];
-  const __m256i lanes = _mm256_or_si256(halves[0].is_irregular, halves[1].is_irregular);
-  return (any & kIrregular) == 0 && _mm256_testz_si256(lanes, lanes) != 0;
+  const __m256i lanes = _mm256_and_si256(halves[0].is_regular, halves[1].is_regular);
+  return (any & kIrregular) == 0 && _mm256_testc_si256(lanes, _mm256_set1_epi32(-1)) != 0;
 }
 
 /// The nearest two of 8 of the 16 descriptors, those from `first` on.

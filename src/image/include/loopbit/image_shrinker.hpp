@@ -12,15 +12,15 @@
 
 namespace loopbit {
 
-/// Averages images down, with memory that is kept from image to image. All is whole numbers: every
-/// processor gives the same pixels.
+/// Averages images down, with memory that is kept from image to image. Sums are whole numbers:
+/// every processor gives the same pixels.
 class ImageShrinker {
  public:
   explicit ImageShrinker(const Kernels& kernels = active_kernels()) : kernels_(kernels) {}
 
   /// Each pixel of `small` is the mean of its part of `gray`, by the share of every pixel in it,
   /// rounded; parts end at multiples of 1/256 px where there are more than 256 along an axis, and
-  /// are exact where there are fewer. `size` is at most gray's along either axis.
+  /// are exact otherwise. `size` is at most gray's along either axis.
   /// Cost: one pass over `gray`.
   void shrink(const cv::Mat1b& gray, cv::Size size, cv::Mat1b& small);
 
