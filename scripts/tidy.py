@@ -12,6 +12,7 @@ static analyzer, which take three times as long, are for --all, which takes one 
 
 import argparse
 import hashlib
+import itertools
 import json
 import os
 import pathlib
@@ -28,7 +29,7 @@ QUICK = ["--checks=-clang-analyzer-*,-bugprone-reserved-identifier,-bugprone-str
          "-modernize-use-transparent-functors,-modernize-deprecated-ios-base-aliases"]
 # A source includes no other, but a batch does.
 BATCHED = ["--checks=" + QUICK[0].split("=")[1] + ",-bugprone-suspicious-include"]
-BATCH_SIZE = 20
+BATCH_SIZE = 30
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
@@ -68,44 +69,55 @@ def check(source, stamp, build, options):
     return result.stdout or result.stderr or f"{source}: exit code {result.returncode}\n"
 
 
-def flags(entry):
-    """What a source is compiled with, but its own name and that of its object."""
-    command = shlex.split(entry["command"])
-    output = command[command.index("-o") + 1]
-    first = next(i for i, part in enumerate(command) if part.startswith("-"))
-    return tuple(part for part in command[first:]
-                 if part not in ("-o", output, "-c", entry["file"]))
+def split_flags(entry):
+    """What a source is compiled with, but its own name and that of its object: where headers and
+    definitions come from, and the rest."""
+    command = iter(shlex.split(entry["command"])[1:])
+    places, others = [], []
+    for part in command:
+        if part == "-isystem":
+            places.append((part, next(command)))
+        elif part.startswith(("-I", "-D")):
+            places.append((part,))
+        elif part in ("-o", "-include"):
+            next(command)
+        elif part not in ("-c", entry["file"], "-fPIC") and not part.startswith("-fvisibility"):
+            others.append(part)
+    return places, tuple(others)
 
 
 def check_batch(batch, pending, build):
-    """As check(), of sources that share their flags: together. Where that finds faults, or they
+    """As check(), of several sources together, with flags for all. Where that finds faults, or they
     cannot be compiled together, by halves."""
-    sources, shared = batch
+    sources, flags = batch
     if len(sources) == 1:
         return [check(sources[0], pending[sources[0]], build, QUICK)]
     text = "".join(f'#include "{source}"\n' for source in sources)
     together = build / "tidy_batches" / f"{hashlib.sha256(text.encode()).hexdigest()}.cpp"
     together.write_text(text)
     result = subprocess.run([TIDY, "--quiet", *BATCHED, f"--config-file={ROOT}/.clang-tidy",
-                             together, "--", *shared], capture_output=True)
+                             together, "--", *flags], capture_output=True)
     together.unlink()
     if result.returncode == 0:
         for source in sources:
             pending[source].touch()
         return [""] * len(sources)
     middle = len(sources) // 2
-    return (check_batch((sources[:middle], shared), pending, build)
-            + check_batch((sources[middle:], shared), pending, build))
+    return (check_batch((sources[:middle], flags), pending, build)
+            + check_batch((sources[middle:], flags), pending, build))
 
 
 def batches(todo):
-    """Sources with equal flags, and these."""
-    by_flags = {}
+    """Sources that may be compiled together, and the flags for that."""
+    by_others = {}
     for source, entry in todo.items():
-        by_flags.setdefault(flags(entry), []).append(source)
-    for shared, sources in by_flags.items():
-        for first in range(0, len(sources), BATCH_SIZE):
-            yield sources[first:first + BATCH_SIZE], shared
+        places, others = split_flags(entry)
+        by_others.setdefault(others, []).append((source, places))
+    for others, entries in by_others.items():
+        for first in range(0, len(entries), BATCH_SIZE):
+            batch = entries[first:first + BATCH_SIZE]
+            places = dict.fromkeys(place for _, places in batch for place in places)
+            yield [source for source, _ in batch], [*itertools.chain(*places), *others]
 
 
 def main():

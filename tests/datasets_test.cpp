@@ -495,7 +495,7 @@ TEST_F(Datasets, CameraNumbersAreChecked) {
 }
 
 TEST_F(Datasets, MissingCameraIsAnError) {
-#ifdef __SANITIZE_ADDRESS__
+#ifdef LOOPBIT_SANITIZED
   GTEST_SKIP() << "OpenCV's search for cameras leaks (libdc1394, libusb)";
 #endif
   expect_open_error("camera:99", ErrorKind::input, {"camera:99", "attached"});

@@ -360,6 +360,14 @@ class EvaluationCommandTest(CommandTest):
         record = json.loads((self.out / "citycentre" / "run.json").read_text())
         self.assertEqual((record["counts"]["frames"], record["input"]["every"]), (12, 2))
 
+    def test_a_matrix_whose_loops_are_all_in_the_first_half_tells_of_all_images(self):
+        data = self.public_data()
+        write_mat(data / "City_Centre" / "CityCentreGroundTruth.mat", "truth", 24, [(11, 0)])
+        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        record = json.loads((self.out / "citycentre" / "run.json").read_text())
+        self.assertEqual((record["counts"]["frames"], record["input"]["every"]), (24, 1))
+
     def test_a_matrix_of_left_images_only_may_be_given_again(self):
         data = self.public_data()
         images = data / "City_Centre" / "Images"

@@ -7,7 +7,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from typing import Any, Union
+from typing import Any, TypeVar, Union
 
 from loopbit import _loopbit
 from loopbit._loopbit import (
@@ -22,6 +22,7 @@ from loopbit._loopbit import (
 
 Path = Union[str, "os.PathLike[str]"]
 Times = Sequence[Union[float, None]]
+_Value = TypeVar("_Value", int, str)
 
 
 def read_truth(
@@ -150,15 +151,20 @@ def evaluate(
 
 def recorded_scoring(run: FinishedRun) -> tuple[int, str]:
     """The tolerance and the protocol that the run was scored with when it ended."""
-    score = _record(run).get("score", {})
-    return score.get("tolerance_frames", 0), score.get("protocol") or ""
+    return _value_at(run, "score", "tolerance_frames", 0), _value_at(run, "score", "protocol", "")
 
 
 def _every(run: FinishedRun) -> int:
     """Of the frames that files of truth count, every so-many-th was read."""
-    read = _record(run).get("input", {})
-    every: int = read.get("every", 1) // read.get("views", 1)
-    return every
+    every, views = (max(1, _value_at(run, "input", name, 1)) for name in ("every", "views"))
+    return max(1, every // views)
+
+
+def _value_at(run: FinishedRun, part: str, name: str, otherwise: _Value) -> _Value:
+    """What stands there in run.json; `otherwise` where nothing of that type does."""
+    found = _record(run).get(part)
+    value = found.get(name) if isinstance(found, dict) else None
+    return value if isinstance(value, type(otherwise)) else otherwise
 
 
 def _record(run: FinishedRun) -> dict[str, Any]:

@@ -107,6 +107,24 @@ std::optional<std::size_t> frames_in(const std::string& images) {
   return open_source(images)->size();
 }
 
+bool has_rows_for(const TruthFlags& truth, std::size_t frames) {
+  try {
+    (void)truth.read_truth(FrameTimes(frames), 1);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+/// Later versions of FAB-MAP's matrices have rows for the left images only.
+bool tells_of_left_only(const TruthFlags& truth, std::size_t images) {
+  if (has_rows_for(truth, images)) return false;
+  const std::optional<GroundTruth> loops = truth.read_truth({}, 1);
+  return std::ranges::all_of(loops->same_place, [&](const PlaceRun& run) {
+    return 2 * static_cast<std::size_t>(run.query) < images;
+  });
+}
+
 /// A set of FAB-MAP's: a folder Images with left and right images in turn, and beside it a .mat
 /// file whose name says "truth".
 std::optional<PublicSet> find_fab_map_set(const fs::path& data, std::string_view name) {
@@ -121,12 +139,7 @@ std::optional<PublicSet> find_fab_map_set(const fs::path& data, std::string_view
       if (is_truth && entry.extension() == ".mat") set.truth.truth = entry.string();
     }
     if (set.images.empty() || set.truth.truth.empty()) continue;
-    // Later versions of these matrices tell of the left images only.
-    const std::size_t images = frames_in(set.images).value_or(0);
-    const auto truth = set.truth.read_truth({}, 1);
-    int rows = 0;
-    for (const PlaceRun& run : truth->same_place) rows = std::max(rows, run.query + 1);
-    if (static_cast<std::size_t>(rows) * 2 <= images) set.every = set.views = 2;
+    if (tells_of_left_only(set.truth, frames_in(set.images).value_or(0))) set.every = set.views = 2;
     return set;
   }
   return std::nullopt;

@@ -34,7 +34,7 @@ std::pair<std::string, std::string> name_and_path(const std::string& text) {
   return {is_folder(text) ? last.filename().string() : last.stem().string(), text};
 }
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 /// Throws Error where the record of a run is none.
 Json record_of(const FinishedRun& run) {

@@ -12,14 +12,14 @@ namespace {
 constexpr double kNear_m = 0.2;
 constexpr double kHorizon_m = 1e5;
 
-struct Interval {
+struct RayInterval {
   double begin = -std::numeric_limits<double>::infinity();
   double end = std::numeric_limits<double>::infinity();
 };
 
 /// Depths at which origin + direction * depth lies within low..high.
-Interval between(double origin, double direction, double low, double high) {
-  if (direction == 0) return origin >= low && origin <= high ? Interval{} : Interval{1, 0};
+RayInterval between(double origin, double direction, double low, double high) {
+  if (direction == 0) return origin >= low && origin <= high ? RayInterval{} : RayInterval{1, 0};
   const double a = (low - origin) / direction;
   const double b = (high - origin) / direction;
   return {std::min(a, b), std::max(a, b)};
@@ -107,9 +107,9 @@ bool ColumnTracer::hit_prism(int index, Vec2 ray, Hit& hit) const {
   const Vec2 v_axis = left_of(prism.axis);
   const double u_step = dot(ray, prism.axis);
   const double v_step = dot(ray, v_axis);
-  const Interval u =
+  const RayInterval u =
       between(dot(from, prism.axis), u_step, -prism.half_length_m, prism.half_length_m);
-  const Interval v = between(dot(from, v_axis), v_step, prism.v_min(), prism.v_max());
+  const RayInterval v = between(dot(from, v_axis), v_step, prism.v_min(), prism.v_max());
   hit.index = index;
   hit.begin_m = std::max(u.begin, v.begin);
   hit.end_m = std::min(u.end, v.end);

@@ -159,6 +159,25 @@ def test_truth_may_count_two_images_as_one_frame(dataset, tmp_path):
     assert left.positives == 2
 
 
+@pytest.mark.parametrize("part, damaged, positives", [
+    ("input", {"every": 2, "views": 0}, 1),
+    ("input", {"every": 2, "views": "two"}, 1),
+    ("input", {"every": 2, "views": 9}, 2),
+    ("input", [2], 2),
+    ("score", {"tolerance_frames": "none"}, 1),
+    ("score", 7, 1),
+])
+def test_what_makes_no_sense_in_a_record_is_as_if_missing(dataset, tmp_path, part, damaged,
+                                                          positives):
+    source = loopbit.open_source(dataset / "images", every=2)
+    (tmp_path / "true.csv").write_text("30,2\n31,2\n")
+    run = loopbit.run_folder(source, tmp_path / "run", evidence=False, truth=tmp_path / "true.csv")
+    record = json.loads(run.record_json)
+    (tmp_path / "run" / "run.json").write_text(json.dumps({**record, part: damaged}))
+    given = None if part == "score" else tmp_path / "true.csv"
+    assert loopbit.evaluate(tmp_path / "run", given).decision.positives == positives
+
+
 def test_frames_that_nobody_knows():
     truth = loopbit.GroundTruth([[10, 0, 2], [12, 4, 4]], unknown=[5, 12])
     assert truth.unknown.tolist() == [5, 12] and truth.every == 1 and "unknown=2" in repr(truth)

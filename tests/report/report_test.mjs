@@ -47,6 +47,8 @@ const kSamples = {
   "one frame": { frames: 1 },
   "two frames": { frames: 2, truth: false, poses: false },
 };
+/** Most of a check is waiting for what is on the screen. */
+const kReportsAtOnce = 3;
 /** The samples that also stand for looks and keys; the others differ in data only. */
 const kInFull = ["several revisits", "three runs", "one frame"];
 
@@ -139,7 +141,10 @@ async function checkReport(
 }
 
 /** 10,000 frames: how large, how soon on the screen, how soon after a key. */
-async function checkSpeed(browser, file) {
+async function checkSpeed(browser, template, scratch) {
+  const file = path.join(scratch, "large.html");
+  const data = sampleData({ frames: 10_000, picturesMb: 12 });
+  writeFileSync(file, pageWith(template, data));
   let opened = null;
   try {
     opened = await open(browser, file);
@@ -179,35 +184,42 @@ async function checkSpeed(browser, file) {
   }
 }
 
+/** A function for each report, which checks it in a browser. */
+function* checksOfReports({ reports, page, screenshots }, scratch) {
+  for (const { file, runJson } of reports) {
+    const record = runJson ? JSON.parse(readFileSync(runJson, "utf8")) : null;
+    const name = path.basename(path.dirname(path.resolve(file)));
+    yield (browser) => checkReport(browser, file, name, { runJson: record, screenshots });
+  }
+  if (!page) return;
+  const template = readFileSync(page, "utf8");
+  for (const [i, [name, options]] of Object.entries(kSamples).entries()) {
+    const isBrief = !kInFull.includes(name);
+    yield (browser) => {
+      const file = path.join(scratch, `${i}.html`);
+      writeFileSync(file, pageWith(template, sampleData(options)));
+      return checkReport(browser, file, name, { screenshots, isBrief });
+    };
+  }
+  yield (browser) => checkSpeed(browser, template, scratch);
+}
+
 async function main() {
   const wanted = argumentsOf(process.argv.slice(2));
-  const { screenshots } = wanted;
   const scratch = mkdtempSync(path.join(tmpdir(), "loopbit_report_"));
-  const browser = await launch(wanted.playwright);
   const failed = [];
+  const checks = [...checksOfReports(wanted, scratch)].values();
+  const takeTurns = async () => {
+    const browser = await launch(wanted.playwright);
+    try {
+      for (const check of checks) failed.push(...(await check(browser)));
+    } finally {
+      await browser.close();
+    }
+  };
   try {
-    for (const { file, runJson } of wanted.reports) {
-      const record = runJson ? JSON.parse(readFileSync(runJson, "utf8")) : null;
-      const name = path.basename(path.dirname(path.resolve(file)));
-      failed.push(...(await checkReport(browser, file, name, { runJson: record, screenshots })));
-    }
-    if (wanted.page) {
-      const template = readFileSync(wanted.page, "utf8");
-      const file = path.join(scratch, "report.html");
-      for (const [name, options] of Object.entries(kSamples)) {
-        writeFileSync(file, pageWith(template, sampleData(options)));
-        failed.push(
-          ...(await checkReport(browser, file, name, {
-            screenshots,
-            isBrief: !kInFull.includes(name),
-          })),
-        );
-      }
-      writeFileSync(file, pageWith(template, sampleData({ frames: 10_000, picturesMb: 12 })));
-      failed.push(...(await checkSpeed(browser, file)));
-    }
+    await Promise.all(Array.from({ length: kReportsAtOnce }, takeTurns));
   } finally {
-    await browser.close();
     rmSync(scratch, { recursive: true });
   }
   if (failed.length > 0) console.log(`\n${failed.length} failed:\n  ${failed.join("\n  ")}`);
