@@ -110,7 +110,8 @@ void run(const char* input) {
   const auto source = loopbit::open_source(input);
   KeyframeId id = 0;
   for (loopbit::Frame frame; source->next(frame); ++id) {
-    if (id % kEvery == 0 && !frame.image.empty()) closer.add({id, frame.image});
+    if (!frame.error.empty()) std::cerr << frame.error << '\n';
+    if (id % kEvery == 0 && frame.error.empty()) closer.add({id, frame.image});
   }
 }
 

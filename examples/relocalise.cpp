@@ -24,7 +24,10 @@ void run(const std::string& path, const std::string& input) {
   const auto source = loopbit::open_source(input);
   std::vector<loopbit::RankedPlace> ranking;
   for (loopbit::Frame frame; source->next(frame);) {
-    if (frame.image.empty()) continue;
+    if (!frame.error.empty()) {
+      std::cerr << frame.error << '\n';
+      continue;
+    }
     const loopbit::Detection found = detector.query(frame.image, std::nullopt, &ranking);
     std::cout << frame.name;
     if (found.status == loopbit::Status::loop) {

@@ -11,7 +11,8 @@ def relocalise(path, images):
     detector = loopbit.LoopDetector(map=map)
     ranking = []
     for frame in loopbit.open_source(images):
-        if frame.image is None:
+        if frame.error:
+            print(frame.error, file=sys.stderr)
             continue
         found = detector.query(frame.image, ranking=ranking)
         if found.is_loop:

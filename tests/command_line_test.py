@@ -258,6 +258,27 @@ class CommandLineTest(CommandTest):
         self.assertEqual([row["status"] for row in rows(self.out)],
                          ["unreadable", "no_earlier_place"])
 
+    def test_images_too_small_to_use_leave_an_earlier_run_alone(self):
+        self.assertEqual(loopbit("run", self.few_images(3), "--out", self.out).returncode, 0)
+        before = (self.out / "loops.csv").read_bytes()
+        tiny = self.scratch / "tiny"
+        tiny.mkdir()
+        (tiny / "1.pgm").write_bytes(b"P5 20 20 255\n" + bytes(400))
+        ran = loopbit("run", tiny, "--out", self.out, "--overwrite")
+        self.assert_fails(ran, 3, tiny, "1.pgm", "20 x 20")
+        self.assertEqual((self.out / "loops.csv").read_bytes(), before)
+
+    def test_a_window_of_seconds_without_times_writes_nothing(self):
+        few = self.few_images(3)
+        seconds = ("--set", "exclusion.seconds=5")
+        self.assert_fails(loopbit("run", few, "--out", self.out, *seconds), 2, "000000.png")
+        self.assertFalse(self.out.exists())
+        self.assertEqual(loopbit("run", few, "--out", self.out).returncode, 0)
+        before = (self.out / "loops.csv").read_bytes()
+        ran = loopbit("run", few, "--out", self.out, "--overwrite", *seconds)
+        self.assert_fails(ran, 2, "exclusion.seconds", "000000.png")
+        self.assertEqual((self.out / "loops.csv").read_bytes(), before)
+
     def test_a_stderr_that_cannot_be_written_ends_nothing(self):
         run = [LOOPBIT, "run", self.unreadable_images(20), "--no-report", "--out"]
         missing = [LOOPBIT, "run", self.scratch / "none", "--out", self.out]

@@ -257,6 +257,25 @@ TEST_F(Datasets, KittiTimesMustCoverTheImages) {
   expect_open_error(path(), ErrorKind::input, {path("times.txt"), "line 2", "'nan'"});
 }
 
+TEST_F(Datasets, KittiTimesAreThoseOfTheNumbersWhereImagesAreMissing) {
+  write_images({"image_0/000000.png", "image_0/000002.png", "image_0/000003.png"});
+  write("times.txt", "0.0\n0.1\n0.2\n0.3\n0.4\n");
+  const std::vector<Frame> frames = read_all(path());
+  EXPECT_DOUBLE_EQ(frames.at(0).timestamp_s.value(), 0.0);
+  EXPECT_DOUBLE_EQ(frames.at(1).timestamp_s.value(), 0.2);
+  EXPECT_DOUBLE_EQ(frames.at(2).timestamp_s.value(), 0.3);
+  write_images({"image_0/000005.png"});
+  expect_open_error(path(), ErrorKind::input, {path("times.txt"), "5 times", "000005.png"});
+}
+
+TEST_F(Datasets, EurocSaysWhichCameraItIs) {
+  write_images({"mav0/cam1/data/a.png"});
+  write("mav0/cam1/data.csv", "#timestamp [ns],filename\n1403636579763555584,a.png\n");
+  for (const std::string folder : {"mav0/cam1", "mav0/cam1/", "mav0/cam1/."}) {
+    EXPECT_EQ(open_source(path(folder))->description(), "EuRoC sequence, cam1") << folder;
+  }
+}
+
 TEST_F(Datasets, EurocIsFoundFromAnyOfItsFolders) {
   write_images({"mav0/cam0/data/a.png", "mav0/cam0/data/b.png"});
   write("mav0/cam0/data.csv",

@@ -500,6 +500,18 @@ TEST(LoopDetector, StandingStillInHeavyNoiseIsNoLoop) {
   }
 }
 
+TEST(LoopDetector, DarkFramesWhileStandingStillMakeNoLoops) {
+  LoopDetector detector(fast_options());
+  Random random;
+  const cv::Mat1b scene = view(1);
+  const cv::Mat1b dark(scene.size(), uchar{0});
+  for (int frame = 0; frame < 80; ++frame) {
+    const bool is_covered = frame == 3 || frame % 20 == 19;
+    const cv::Mat1b image = is_covered ? dark : with_noise(scene, 4.0, random);
+    EXPECT_EQ(detector.process(image).status, Status::no_earlier_place) << frame;
+  }
+}
+
 TEST(LoopDetector, PassingAlongOneSceneIsNoLoopUntilItIsSeenAgain) {
   constexpr int kStepPx = 16;
   constexpr int kFrames = 70;

@@ -389,6 +389,18 @@ TEST(OptionsFromJson, DeeplyNestedOnesAreRefused) {
                [&] { options_from_json(R"({"surf": )" + open + close + "}", "a.json"); });
 }
 
+TEST(OptionsFromJson, WhatStandsTwiceIsRefused) {
+  for (const std::string json : {R"({"surf": {"max_keypoints": 100}, "surf": {"upright": false}})",
+                                 R"({"surf": {"upright": true, "surf": 1, "upright": false}})"}) {
+    const std::string name = json.find("max") != std::string::npos ? "'surf'" : "'upright'";
+    expect_error(ErrorKind::option, {"a.json", name, "twice"},
+                 [&] { options_from_json(json, "a.json"); });
+  }
+  const std::string once =
+      R"({"surf": {"max_keypoints": 100}, "verification": {"max_ratio": 0.7}})";
+  EXPECT_EQ(options_from_json(once, "a.json").surf.max_keypoints, 100);
+}
+
 TEST(SetOption, ARefusedValueChangesNothing) {
   LoopDetectorOptions options;
   EXPECT_THROW(set_option(options, "surf.max_keypoints", "49"), Error);

@@ -48,11 +48,16 @@ TEST(Picture, JpegShowsAnyCameraImage) {
   const cv::Mat1b grey = textured_image({752, 480}, 5);
   cv::Mat sixteen_bit;
   grey.convertTo(sixteen_bit, CV_16U, 257.0);
+  cv::Mat twelve_bit;
+  grey.convertTo(twelve_bit, CV_16U, 16.0);
+  cv::Mat sixteen_bit_colour;
+  cv::cvtColor(twelve_bit, sixteen_bit_colour, cv::COLOR_GRAY2BGRA);
   cv::Mat colour;
   cv::cvtColor(grey, colour, cv::COLOR_GRAY2BGRA);
   cv::Mat expected;
   cv::resize(grey, expected, {256, 163}, 0, 0, cv::INTER_AREA);
-  for (const cv::Mat& image : {cv::Mat(grey), sixteen_bit, colour}) {
+  for (const cv::Mat& image :
+       {cv::Mat(grey), sixteen_bit, twelve_bit, sixteen_bit_colour, colour}) {
     const cv::Mat shown = cv::imdecode(picture_jpeg(image), cv::IMREAD_GRAYSCALE);
     ASSERT_EQ(shown.size(), expected.size());
     EXPECT_LT(cv::norm(shown, expected, cv::NORM_L1) / 256 / 163, 5.0);

@@ -131,6 +131,21 @@ TEST_F(RecordedRunTest, WhatRefusesARunCostsNoEarlierOne) {
                      [&] { const RecordedRun run(record(), {}); });
 }
 
+/// Two frames that can be read, but are too small for any detector.
+class TinyViews final : public ImageSource {
+ public:
+  bool next(Frame& frame) override {
+    frame = {.name = "tiny", .timestamp_s = {}, .image = cv::Mat1b(20, 20, uchar{9}), .error = ""};
+    return left_-- > 0;
+  }
+  bool skip() override { return left_-- > 0; }
+  [[nodiscard]] std::optional<std::size_t> size() const override { return 2; }
+  [[nodiscard]] std::string description() const override { return "two tiny views"; }
+
+ private:
+  int left_ = 2;
+};
+
 /// Frames that no one can read, before three views or none.
 class BadBegin final : public ImageSource {
  public:
@@ -166,8 +181,8 @@ TEST_F(RecordedRunTest, ARunWithoutAReadableFrameIsRefusedWhenItHasEnded) {
 
 TEST_F(RecordedRunTest, AProvenSourceGivesTheSameFrames) {
   ProvableSource source(std::make_unique<BadBegin>(true));
-  source.prove("views");
-  source.prove("views");
+  EXPECT_FALSE(source.prove("views").image.empty());
+  EXPECT_FALSE(source.prove("views").image.empty());
   Frame frame;
   EXPECT_TRUE(source.next(frame));
   EXPECT_EQ(frame.error, "It is no image.");
@@ -178,6 +193,9 @@ TEST_F(RecordedRunTest, AProvenSourceGivesTheSameFrames) {
   }
   EXPECT_FALSE(source.next(frame));
   EXPECT_FALSE(source.skip());
+  ProvableSource tiny(std::make_unique<TinyViews>());
+  test::expect_error(ErrorKind::input, {"None of the 2 frames of 'views'", "'tiny'", "20 x 20"},
+                     [&] { tiny.prove("views"); });
   ProvableSource bad(std::make_unique<BadBegin>(false));
   for (int i = 0; i < 2; ++i) {
     test::expect_error(ErrorKind::input, {"None of the 2 frames of 'views'", "It is no image."},

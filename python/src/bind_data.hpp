@@ -9,7 +9,9 @@
 #include <utility>
 
 #include "loopbit/image_source.hpp"
+#include "loopbit/loop_detector_options.hpp"
 #include "loopbit/provable_source.hpp"
+#include "loopbit/runner.hpp"
 
 namespace loopbit::python {
 
@@ -30,10 +32,10 @@ class SharedSource : public ImageSource {
     const std::scoped_lock lock(mutex_);
     return counted(source_.skip());
   }
-  /// See ProvableSource.
-  void prove() {
+  /// See ProvableSource and check_time.
+  void prove(const LoopDetectorOptions& options) {
     const std::scoped_lock lock(mutex_);
-    source_.prove(input_);
+    check_time(source_.prove(input_), options);
   }
 
   /// How many frames are still to come, where that is sure.

@@ -100,7 +100,7 @@ void bind_recorded_run(py::module_& module) {
       .def(py::init([](SharedSource& source, const Path& out, const LoopDetectorOptions& options,
                        const Path& map, bool overwrite, bool keep_images, const Path& truth,
                        const Path& poses) {
-             if (overwrite) source.prove();
+             if (overwrite || options.exclusion.seconds > 0) source.prove(options);
              return std::make_unique<RecordedRun>(
                  record_of(source, options, map.string(), truth.string()),
                  RunOutput{.folder = out.string(),

@@ -18,7 +18,9 @@ void parse_number(const std::string& text, const std::string& name, const char* 
   const char* end = text.data() + text.size();
   const auto parsed = std::from_chars(text.data(), end, value);
   if (parsed.ec == std::errc{} && parsed.ptr == end) return;
-  if (parsed.ec == std::errc::result_out_of_range && parsed.ptr == end) kind = "nearer to 0";
+  if (parsed.ec == std::errc::result_out_of_range && parsed.ptr == end) {
+    kind = "neither so large nor so small";
+  }
   throw Error(ErrorKind::option, fmt::format("{} is '{}', but must be {}.", name, text, kind));
 }
 

@@ -115,14 +115,15 @@ int run_session(Session session, const SessionFlags& flags) {
   const int threads = thread_count(flags.threads);
   std::vector<std::string> inputs = session.truth_files;
   inputs.insert(inputs.end(), {session.input, flags.config});
-  if (flags.overwrite) {
+  const LoopDetectorOptions options = flags.detector_options();
+  if (flags.overwrite || options.exclusion.seconds > 0) {
     auto provable = std::make_unique<ProvableSource>(std::move(session.source));
-    provable->prove(session.input);
+    check_time(provable->prove(session.input), options);
     session.source = std::move(provable);
   }
   RecordedRun recorded({.input = session.input,
                         .description = session.source->description(),
-                        .options = flags.detector_options(),
+                        .options = options,
                         .every = session.every,
                         .views = session.views,
                         .limit = session.limit,
@@ -131,7 +132,7 @@ int run_session(Session session, const SessionFlags& flags) {
                         .arguments = session.arguments,
                         .truth = session.truth_description},
                        {flags.out, flags.overwrite, flags.keep_images, inputs});
-  cv::setNumThreads(threads);
+  cv::setNumThreads(std::min(threads, thread_count(0)));  // TBB warns of more
   if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
   try {
     drive(*session.source, recorded, !flags.no_report, stop_requested);

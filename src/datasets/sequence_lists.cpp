@@ -93,6 +93,11 @@ std::vector<double> read_times(const fs::path& file) {
   return times;
 }
 
+/// 12 of 000012.png.
+std::optional<std::size_t> number_of(const std::string& image) {
+  return parse_number<std::size_t>(fs::path(image).stem().string());
+}
+
 ImageList list_kitti(const fs::path& folder, std::string_view camera) {
   ImageList list = list_images(folder / camera, fmt::format("KITTI odometry sequence, {}", camera));
   const fs::path file = folder / "times.txt";
@@ -104,20 +109,33 @@ ImageList list_kitti(const fs::path& folder, std::string_view camera) {
                             "to go without times.",
                             file.string(), times.size(), list.images.size(), camera));
   }
-  for (std::size_t i = 0; i < list.images.size(); ++i) list.images[i].timestamp_s = times[i];
+  for (std::size_t i = 0; i < list.images.size(); ++i) {
+    // Where images are missing, their names still tell the rows of the others.
+    const bool is_whole = times.size() == list.images.size();
+    const std::size_t row = is_whole ? i : number_of(list.images[i].name).value_or(i);
+    if (row >= times.size()) {
+      throw Error(ErrorKind::input,
+                  fmt::format("'{}' has {} times, none for image {} of {}: complete it, or remove "
+                              "it to go without times.",
+                              file.string(), times.size(), list.images[i].name, camera));
+    }
+    list.images[i].timestamp_s = times[row];
+  }
   return list;
 }
 
 ImageList list_euroc(const fs::path& camera) {
   const fs::path file = camera / "data.csv";
-  ImageList list{camera / "data", "EuRoC sequence, cam0", {}};
+  std::error_code error;
+  const std::string name = fs::canonical(camera, error).filename().string();
+  ImageList list{camera / "data", fmt::format("EuRoC sequence, {}", name), {}};
   for (const TextRow& row : read_rows(file)) {
-    const auto [time, name] = split(row.text, ",");
+    const auto [time, image] = split(row.text, ",");
     const auto seconds = parse_nanoseconds(time);
-    if (!seconds || name.empty() || name.find(',') != std::string_view::npos) {
-      throw_bad_row(file, row, "timestamp_ns,filename");
+    if (!seconds || image.empty() || image.find(',') != std::string_view::npos) {
+      throw_bad_row(file, row, "timestamp_ns,filename, its time in whole nanoseconds");
     }
-    list.images.push_back({std::string(name), seconds});
+    list.images.push_back({std::string(image), seconds});
   }
   if (list.images.empty()) throw_no_rows(file);
   return list;

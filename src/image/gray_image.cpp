@@ -55,20 +55,27 @@ std::uint16_t value_at_rank(const std::vector<std::size_t>& histogram, std::size
 }
 
 cv::Mat1b stretch_to_8_bits(const cv::Mat1w& image) {
+  const auto [dark, bright] = gray_range(image);
+  const int span = bright - dark;
+  cv::Mat1b stretched(image.size());
+  std::transform(
+      image.begin(), image.end(), stretched.begin(),
+      [=, low = dark, high = bright](std::uint16_t value) {
+        return static_cast<std::uint8_t>((std::clamp<int>(value, low, high) - low) * 255 / span);
+      });
+  return stretched;
+}
+
+}  // namespace
+
+GrayRange gray_range(const cv::Mat1w& image) {
   std::vector<std::size_t> histogram(65536, 0);
   for (const std::uint16_t value : image) ++histogram[value];
   const std::size_t thousandth = image.total() / 1000 + 1;
   const int dark = value_at_rank(histogram, thousandth);
   const int bright = value_at_rank(histogram, image.total() - thousandth + 1);
-  const int span = std::max(bright - dark, 1);
-  cv::Mat1b stretched(image.size());
-  std::transform(image.begin(), image.end(), stretched.begin(), [&](std::uint16_t value) {
-    return static_cast<std::uint8_t>((std::clamp<int>(value, dark, bright) - dark) * 255 / span);
-  });
-  return stretched;
+  return {dark, std::max(bright, dark + 1)};
 }
-
-}  // namespace
 
 cv::Mat1b gray_image(const cv::Mat& image) {
   check(image);

@@ -70,6 +70,12 @@ double quick_similarity(const BinaryContent& a, const BinaryContent& b) {
   return larger == 0 ? 0.0 : static_cast<double>(overlap(a, b)) / larger;
 }
 
+/// Whether a content shows another view than the latest change of view did, from their similarity.
+/// One without pixels, of a dark or covered camera, says nothing of the view.
+bool changes_view(const BinaryContent& content, double similarity) {
+  return similarity < kUnmovedSimilarity && count(content) > 0;
+}
+
 /// Of a keypoint in its image, 0 to 1.
 cv::Point2f relative_position(const Features& features, int index) {
   const Keypoint& keypoint = features.keypoints[static_cast<std::size_t>(index)];
@@ -97,7 +103,8 @@ class LoopDetector::Impl {
     memory_.restore([&](const BinaryContent& content) {
       const PlaceId place = index_.add(content);
       const bool is_step =
-          place == 0 || quick_similarity(content, index_.content(latest_step)) < kUnmovedSimilarity;
+          place == 0 ||
+          changes_view(content, quick_similarity(content, index_.content(latest_step)));
       if (is_step) latest_step = place;
       return is_step;
     });
@@ -267,7 +274,8 @@ class LoopDetector::Impl {
   [[nodiscard]] RecentView::Look look(Observation& seen) const {
     const bool is_step =
         recent_view_.empty() ||
-        similarity(seen.content, index_.content(recent_view_.latest_step())) < kUnmovedSimilarity;
+        changes_view(seen.content,
+                     similarity(seen.content, index_.content(recent_view_.latest_step())));
     return recent_view_.look(index_.size(), is_step, [&](PlaceId place) {
       if (is_window_fixed()) return true;
       const Verification& shared = compare(seen, place);

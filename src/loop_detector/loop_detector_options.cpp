@@ -3,7 +3,9 @@
 #include "loopbit/loop_detector_options.hpp"
 
 #include <algorithm>
+#include <array>
 #include <fstream>
+#include <set>
 #include <string>
 #include <type_traits>
 
@@ -114,9 +116,10 @@ std::string to_json(const LoopDetectorOptions& options) {
 }
 
 LoopDetectorOptions options_from_json(const std::string& json, const std::string& source) {
-  // A message that shows a value recurses into it.
-  const auto check_depth = [](int depth, Json::parse_event_t /*event*/, const Json& /*value*/) {
-    constexpr int kMaxDepth = 8;
+  constexpr int kMaxDepth = 8;
+  std::array<std::set<std::string>, kMaxDepth + 2> names;  // of the present object at each depth
+  const auto check = [&](int depth, Json::parse_event_t event, const Json& value) {
+    // A message that shows a value recurses into it.
     if (depth > kMaxDepth) {
       throw Error(
           ErrorKind::option,
@@ -124,11 +127,19 @@ LoopDetectorOptions options_from_json(const std::string& json, const std::string
                       "sections, each an object of settings.",
                       kMaxDepth));
     }
+    const auto level = static_cast<std::size_t>(depth);
+    if (event == Json::parse_event_t::object_start) names.at(level + 1).clear();
+    if (event == Json::parse_event_t::key &&
+        !names.at(level).insert(value.get<std::string>()).second) {
+      throw Error(ErrorKind::option,
+                  fmt::format("'{}' stands twice in one object; write all that belongs to it once.",
+                              value.get<std::string>()));
+    }
     return true;
   };
   LoopDetectorOptions options;
   try {
-    const Json parsed = Json::parse(json, check_depth, true, true);
+    const Json parsed = Json::parse(json, check, true, true);
     if (!parsed.is_object()) {
       throw Error(ErrorKind::option, "The settings must be a JSON object of sections.");
     }

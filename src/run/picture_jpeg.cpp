@@ -8,6 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "loopbit/gray_image.hpp"
 #include "loopbit/picture.hpp"
 
 namespace loopbit {
@@ -15,11 +16,17 @@ namespace {
 
 constexpr int kJpegQuality = 75;
 
-/// 8 bits, one channel or three.
+/// 8 bits, one channel or three; of 16 bits the range that gray_image() shows the detector.
 cv::Mat displayable(const cv::Mat& image) {
-  cv::Mat eight_bit = image;
-  if (image.depth() == CV_16U) image.convertTo(eight_bit, CV_8U, 1.0 / 257.0);
-  if (eight_bit.channels() == 4) cv::cvtColor(eight_bit, eight_bit, cv::COLOR_BGRA2BGR);
+  cv::Mat shown = image;
+  if (image.channels() == 4) cv::cvtColor(image, shown, cv::COLOR_BGRA2BGR);
+  if (shown.depth() != CV_16U) return shown;
+  cv::Mat gray = shown;
+  if (shown.channels() == 3) cv::cvtColor(shown, gray, cv::COLOR_BGR2GRAY);
+  const auto [dark, bright] = gray_range(gray);
+  const double scale = 255.0 / (bright - dark);
+  cv::Mat eight_bit;
+  shown.convertTo(eight_bit, CV_8U, scale, -scale * dark);
   return eight_bit;
 }
 

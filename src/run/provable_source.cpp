@@ -8,21 +8,38 @@
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/gray_image.hpp"
 
 namespace loopbit {
+namespace {
+
+/// Why no detector can use `frame`, or nothing.
+std::string fault(const Frame& frame) {
+  if (!frame.error.empty()) return frame.error;
+  try {
+    (void)gray_image(frame.image);
+  } catch (const Error& error) {
+    return fmt::format("'{}': {}", frame.name, error.what());
+  }
+  return {};
+}
+
+}  // namespace
 
 ProvableSource::ProvableSource(std::unique_ptr<ImageSource> source) : source_(std::move(source)) {
   assert(source_);
 }
 
-void ProvableSource::prove(const std::string& input) {
-  if (!ahead_.empty() && ahead_.back().error.empty()) return;
+const Frame& ProvableSource::prove(const std::string& input) {
+  if (!ahead_.empty() && ahead_.back().error.empty()) return ahead_.back();
   for (Frame frame; source_->next(frame); frame = {}) {
+    frame.error = fault(frame);
+    if (!frame.error.empty()) frame.image.release();  // many may come before one that is usable
     ahead_.push_back(frame);
-    if (frame.error.empty()) return;
+    if (frame.error.empty()) return ahead_.back();
   }
   throw Error(ErrorKind::input,
-              fmt::format("None of the {} frames of '{}' could be read, so no earlier run is "
+              fmt::format("None of the {} frames of '{}' can be used, so no earlier run is "
                           "replaced. {}",
                           ahead_.size(), input, ahead_.empty() ? "" : ahead_.front().error));
 }

@@ -18,18 +18,16 @@ std::string fault(const Frame& frame, const std::optional<cv::Size>& size) {
       frame.name, frame.image.cols, frame.image.rows, size->width, size->height);
 }
 
-/// Of the first usable frame: where the settings need times that it does not have, no other is any
-/// better.
-void check_time(const Frame& frame, const LoopDetector& detector) {
-  const double seconds = detector.options().exclusion.seconds;
+}  // namespace
+
+void check_time(const Frame& frame, const LoopDetectorOptions& options) {
+  const double seconds = options.exclusion.seconds;
   if (seconds <= 0 || frame.timestamp_s) return;
   throw Error(ErrorKind::option,
               fmt::format("exclusion.seconds is {}, but '{}' has no time; give the times of the "
                           "images, or set exclusion.frames in its place.",
                           seconds, frame.name));
 }
-
-}  // namespace
 
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
          const std::atomic<bool>& stop) {
@@ -42,7 +40,7 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
     if (const std::string reason = fault(frame, size); !reason.empty()) {
       return leave_out(frame, reason);
     }
-    if (!size) check_time(frame, detector);
+    if (!size) check_time(frame, detector.options());
     Evidence evidence;
     Detection detection;
     try {

@@ -9,6 +9,16 @@ namespace loopbit {
 /// Images narrower or lower than this hold too little to recognise a place by.
 inline constexpr int kMinImageSidePx = 32;
 
+/// The grey levels between which all but the darkest and the brightest thousandth of a 16-bit image
+/// lie.
+struct GrayRange {
+  int dark = 0;
+  int bright = 65535;  ///< more than `dark`
+};
+
+/// `image`: 16-bit grey, not empty.
+GrayRange gray_range(const cv::Mat1w& image);
+
 /// The 8-bit grey picture of any camera image, which all parts work on.
 ///
 /// `image`: 8- or 16-bit unsigned, grey, BGR or BGRA, at least 32 x 32. 16-bit images are stretched

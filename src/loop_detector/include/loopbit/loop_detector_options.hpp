@@ -19,7 +19,7 @@ namespace loopbit {
 /// Which of the latest frames are too recent to be candidates. With `frames` and `seconds` both 0,
 /// recent is what the camera has had in view until now without a break, and as much again: this
 /// needs no setting for walked, driven or hand-held cameras at any frame rate, or for one that
-/// stands still.
+/// stands still (but see docs/method.md where it has done so since the run began).
 struct ExclusionOptions {
   int min_frames = 10;
   int frames = 0;

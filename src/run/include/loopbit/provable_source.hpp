@@ -12,14 +12,16 @@
 
 namespace loopbit {
 
-/// A source that can be asked for a frame that can be read before a run of it replaces another.
+/// A source that can be asked for a frame that a detector can use before a run of it replaces
+/// another.
 class ProvableSource final : public ImageSource {
  public:
   explicit ProvableSource(std::unique_ptr<ImageSource> source);
 
-  /// Reads ahead, so that next() gives all the same, to the first frame that can be read. Throws
-  /// Error (kind input) that names `input` if none is left.
-  void prove(const std::string& input);
+  /// Reads ahead, so that next() gives all the same, to the first frame that can be used, which it
+  /// returns; valid until the next call of any function. Throws Error (kind input) that names
+  /// `input` if none is left.
+  const Frame& prove(const std::string& input);
 
   bool next(Frame& frame) override;
   bool skip() override;

@@ -22,10 +22,14 @@ struct RunListener {
   std::function<void(const Detection&, const cv::Mat& image, const Evidence&)> on_evidence = {};
 };
 
+/// Of the first frame that can be used: where it has no time, no other is any better. Throws Error
+/// (kind option) if exclusion.seconds is set and it has none.
+void check_time(const Frame& frame, const LoopDetectorOptions& options);
+
 /// Reads `source` to its end, or until `stop` turns true, and detects frame by frame. A frame that
 /// is unreadable, or whose size differs from the first one's, is reported and counted with the
 /// status unreadable, and the run goes on. Errors from the listener end the run. Throws Error (kind
-/// option) if exclusion.seconds is set and the first usable frame has no time.
+/// option), see check_time().
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
          const std::atomic<bool>& stop);
 
