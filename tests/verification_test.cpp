@@ -463,7 +463,7 @@ TEST(Verify, AFirstLookMatchesTheStrongestFeatures) {
   const Features of_query = strongest(query, kLooked);
   const Features of_place = strongest(place, kLooked);
   Verifier verifier({.first_look_keypoints = kLooked});
-  Verification look;
+  FirstLook look;
   verifier.match_strongest(query, place, look);
   const std::vector<Match> expected = match_features(of_query, of_place, 0.8);
   ASSERT_GT(expected.size(), 5U);
@@ -505,11 +505,44 @@ TEST(Verify, AFirstLookAtFewFeaturesIsAWholeOne) {
   const Features query = extract_surf(view(2), {.max_keypoints = 100});
   const Features place = extract_surf(view(2, {12, 5}), {.max_keypoints = 90});
   Verifier verifier;
-  Verification look;
+  FirstLook look;
   verifier.match_strongest(query, place, look);
   EXPECT_EQ(look.matches, verify(query, place).matches);
   verifier.match_strongest(query, {}, look);
   EXPECT_TRUE(look.matches.empty());
+}
+
+/// `features` with each descriptor twice, so that all distances are those of several.
+Features with_twins(Features features) {
+  for (std::size_t i = 0; i + 1 < features.descriptors.size(); i += 2) {
+    features.descriptors[i + 1] = features.descriptors[i];
+  }
+  return features;
+}
+
+TEST(Verify, AFirstLookChangesNoMatch) {
+  const Features query = extract_surf(view(2));
+  const Features nearby = extract_surf(view(2, {12, 5}));
+  const std::vector<Features> places = {nearby,
+                                        query,
+                                        with_twins(nearby),
+                                        extract_surf(view(3)),
+                                        extract_surf(view(2, {12, 5}), {.max_keypoints = 50}),
+                                        {}};
+  Verification result;
+  FirstLook look;
+  for (const int looked : {16, 17, 60, 300, 10'000}) {
+    Verifier verifier({.first_look_keypoints = looked});
+    for (const Features& place : places) {
+      for (const auto& [a, b] : {std::pair(&query, &place), std::pair(&place, &query)}) {
+        verifier.match_strongest(*a, *b, look);
+        verifier.match(*a, *b, look, result);
+        EXPECT_EQ(result.matches, match_features(*a, *b, 0.8)) << looked;
+        verifier.match(*a, *b, result);
+        EXPECT_EQ(result.matches, match_features(*a, *b, 0.8)) << looked;
+      }
+    }
+  }
 }
 
 TEST(Verify, OtherSceneHasFewInliers) {

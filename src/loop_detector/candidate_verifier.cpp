@@ -116,7 +116,7 @@ std::vector<double> CandidateVerifier::shared_around(const Query& query,
   std::vector<int> matches;
   matches.reserve(around.size());
   for (const Candidate& c : around) {
-    matches.push_back(static_cast<int>(first_look(query, c.place).size()));
+    matches.push_back(static_cast<int>(first_look(query, c.place).matches.size()));
   }
   std::vector<double> shared;
   shared.reserve(matches.size());
@@ -153,16 +153,16 @@ std::vector<VerifiedCandidate> CandidateVerifier::unverified(
   return unverified;
 }
 
-/// The matches of the strongest keypoints, which are found once a frame; valid until the next look.
-const std::vector<Match>& CandidateVerifier::first_look(const Query& query, PlaceId place) {
+/// What the strongest keypoints tell, which is found once a frame; valid until the next look.
+const FirstLook& CandidateVerifier::first_look(const Query& query, PlaceId place) {
   for (std::size_t i = 0; i < num_looks_; ++i) {
-    if (looks_[i].place == place) return looks_[i].result.matches;
+    if (looks_[i].place == place) return looks_[i].found;
   }
   if (num_looks_ == looks_.size()) looks_.emplace_back();
   Look& look = looks_[num_looks_++];
   look.place = place;
-  verifier_.match_strongest(query.features, places_.features(place), look.result);
-  return look.result.matches;
+  verifier_.match_strongest(query.features, places_.features(place), look.found);
+  return look.found;
 }
 
 /// Indices into `verified`, those first that may be expected to have the highest scores: a place
@@ -177,7 +177,7 @@ std::vector<std::size_t> CandidateVerifier::by_first_look(
   scores.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
     VerifiedCandidate expected = verified[i];
-    const auto matches = first_look(query, expected.candidate.place).size();
+    const auto matches = first_look(query, expected.candidate.place).matches.size();
     expected.distinct_inliers = static_cast<int>(matches);
     expected.inlier_worth = worth;
     scores.emplace_back(-agreement_.score(expected, query.is_step), i);
@@ -192,7 +192,9 @@ std::vector<std::size_t> CandidateVerifier::by_first_look(
 /// The first half of the verification of a candidate: its matches.
 void CandidateVerifier::match(const Query& query, VerifiedCandidate& candidate,
                               Verification& result) {
-  verifier_.match(query.features, places_.features(candidate.candidate.place), result);
+  const PlaceId place = candidate.candidate.place;
+  const FirstLook& look = first_look(query, place);
+  verifier_.match(query.features, places_.features(place), look, result);
   candidate.matches = static_cast<int>(result.matches.size());
 }
 
@@ -266,7 +268,7 @@ void CandidateVerifier::look_at_others(const Query& query, std::span<const std::
   for (const std::size_t i : order) {
     if (!is_elsewhere(verified[i])) continue;
     const PlaceId number = verified[i].candidate.place;
-    if (num_shared(first_look(query, number)) < kMinSharedAtFirst) continue;
+    if (num_shared(first_look(query, number).matches) < kMinSharedAtFirst) continue;
     const Features& place = places_.features(number);
     verifier_.match_some(query.features, promising_features_, place, verification_);
     if (verification_.matches.size() < kMinSharedMatches) continue;

@@ -65,14 +65,14 @@ class CandidateVerifier {
  private:
   struct Look {
     PlaceId place = 0;
-    Verification result;  ///< of the strongest keypoints
+    FirstLook found;
   };
 
   [[nodiscard]] Spot spot_of(const VerifiedCandidate& candidate) const;
   std::vector<double> shared_around(const Query& query, const std::vector<Candidate>& around);
   [[nodiscard]] std::vector<VerifiedCandidate> unverified(
       const std::vector<Candidate>& candidates) const;
-  const std::vector<Match>& first_look(const Query& query, PlaceId place);
+  const FirstLook& first_look(const Query& query, PlaceId place);
   std::vector<std::size_t> by_first_look(const Query& query,
                                          const std::vector<VerifiedCandidate>& verified);
   void match(const Query& query, VerifiedCandidate& candidate, Verification& result);

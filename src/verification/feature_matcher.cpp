@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <iterator>
 #include <numeric>
 
@@ -11,9 +12,25 @@ namespace loopbit {
 namespace {
 
 using Lanes = std::array<Descriptor, kMatchLanes>;
+static_assert(sizeof(Lanes) == kMatchLanes * kDescriptorSize);
 
 bool is_distinct(const NearestTwo& nearest, std::size_t lane, double max_ratio) {
   return nearest.distance_sq[lane] < max_ratio * max_ratio * nearest.second_distance_sq[lane];
+}
+
+/// Takes into `nearest` those of `others`, counted from `first`, that are nearer; of equals, the
+/// earlier ones stay.
+void take_nearer(const NearestTwo& others, std::int32_t first, NearestTwo& nearest) {
+  for (std::size_t lane = 0; lane < kMatchLanes; ++lane) {
+    const std::int32_t known = nearest.distance_sq[lane];
+    const std::int32_t found = others.distance_sq[lane];
+    const bool is_nearer = found < known;
+    nearest.second_distance_sq[lane] = is_nearer
+                                           ? std::min(known, others.second_distance_sq[lane])
+                                           : std::min(found, nearest.second_distance_sq[lane]);
+    nearest.distance_sq[lane] = is_nearer ? found : known;
+    nearest.index[lane] = is_nearer ? first + others.index[lane] : nearest.index[lane];
+  }
 }
 
 /// The descriptors of dark and of bright blobs.
@@ -38,22 +55,42 @@ void FeatureMatcher::find_constants(Descriptors descriptors) {
   kernels_.describe_constants(descriptors.front().data(), descriptors.size(), constants_.data());
 }
 
+/// 0, 1, 2, ... `count` - 1.
+std::span<const int> FeatureMatcher::first_numbers(std::size_t count) {
+  asked_.resize(count);
+  std::iota(asked_.begin(), asked_.end(), 0);
+  return asked_;
+}
+
+/// The nearest two of those `asked`, at most kMatchLanes, among `place`, whose constants were found
+/// last.
+void FeatureMatcher::find_nearest(Descriptors query, std::span<const int> asked, Descriptors place,
+                                  NearestTwo& nearest) const {
+  Lanes lanes{};
+  for (std::size_t lane = 0; lane < asked.size(); ++lane) {
+    lanes[lane] = query[static_cast<std::size_t>(asked[lane])];
+  }
+  kernels_.nearest_two(lanes.front().data(), place.front().data(), constants_.data(), place.size(),
+                       nearest);
+}
+
+void FeatureMatcher::keep_distinct(std::span<const int> asked, const NearestTwo& nearest,
+                                   double max_ratio) {
+  for (std::size_t lane = 0; lane < asked.size(); ++lane) {
+    if (!is_distinct(nearest, lane, max_ratio)) continue;
+    matches_.push_back({asked[lane], nearest.index[lane]});
+  }
+}
+
 void FeatureMatcher::find_one_way(Descriptors query, std::span<const int> asked, Descriptors place,
-                                  double max_ratio) {
+                                  double max_ratio, FirstLook::Group* noted) {
   find_constants(place);
   NearestTwo nearest;
-  Lanes lanes{};
   for (std::size_t begin = 0; begin < asked.size(); begin += kMatchLanes) {
-    const std::size_t count = std::min(kMatchLanes, asked.size() - begin);
-    for (std::size_t lane = 0; lane < count; ++lane) {
-      lanes[lane] = query[static_cast<std::size_t>(asked[begin + lane])];
-    }
-    kernels_.nearest_two(lanes.front().data(), place.front().data(), constants_.data(),
-                         place.size(), nearest);
-    for (std::size_t lane = 0; lane < count; ++lane) {
-      if (!is_distinct(nearest, lane, max_ratio)) continue;
-      matches_.push_back({asked[begin + lane], nearest.index[lane]});
-    }
+    const auto lanes = asked.subspan(begin, std::min(kMatchLanes, asked.size() - begin));
+    find_nearest(query, lanes, place, nearest);
+    keep_distinct(lanes, nearest, max_ratio);
+    if (noted != nullptr) noted->nearest.push_back(nearest);
   }
 }
 
@@ -80,25 +117,70 @@ void FeatureMatcher::keep_mutual(Descriptors query, Descriptors place, double ma
 }
 
 void FeatureMatcher::match_group(Descriptors query, std::span<const int> asked, Descriptors place,
-                                 double max_ratio) {
+                                 double max_ratio, FirstLook::Group* noted) {
   matches_.clear();
   if (asked.empty() || place.empty()) return;
-  find_one_way(query, asked, place, max_ratio);
+  find_one_way(query, asked, place, max_ratio, noted);
+  if (!matches_.empty()) keep_mutual(query, place, max_ratio);
+}
+
+/// As match_group() for all of the query, where the neighbours of its first ones among the first of
+/// the place are known.
+void FeatureMatcher::match_rest(Descriptors query, Descriptors place, double max_ratio,
+                                const FirstLook::Group& known) {
+  matches_.clear();
+  if (query.empty() || place.empty()) return;
+  assert(known.num_query <= query.size() && known.num_place <= place.size());
+  const std::span<const int> all = first_numbers(query.size());
+  const std::span<const int> strongest = all.first(known.num_query);
+  const Descriptors others = place.subspan(known.num_place);
+  const bool has_others = !strongest.empty() && !others.empty();
+  if (has_others) find_constants(others);
+  for (std::size_t block = 0; block < known.nearest.size(); ++block) {
+    const std::size_t begin = block * kMatchLanes;
+    const auto lanes = strongest.subspan(begin, std::min(kMatchLanes, strongest.size() - begin));
+    NearestTwo nearest = known.nearest[block];
+    if (has_others) {
+      NearestTwo among_others;
+      find_nearest(query, lanes, others, among_others);
+      take_nearer(among_others, static_cast<std::int32_t>(known.num_place), nearest);
+    }
+    keep_distinct(lanes, nearest, max_ratio);
+  }
+  find_one_way(query, all.subspan(known.num_query), place, max_ratio, nullptr);
   if (!matches_.empty()) keep_mutual(query, place, max_ratio);
 }
 
 void FeatureMatcher::match(const Features& query, const Features& place, double max_ratio,
-                           std::size_t strongest, std::vector<Match>& matches) {
-  static_assert(sizeof(Descriptor) == kDescriptorSize);
+                           std::vector<Match>& matches) {
+  match(query, place, max_ratio, FirstLook{}, matches);
+}
+
+void FeatureMatcher::match(const Features& query, const Features& place, double max_ratio,
+                           const FirstLook& look, std::vector<Match>& matches) {
+  const Groups of_query = strongest_of(query, query.descriptors.size());
+  const Groups of_place = strongest_of(place, place.descriptors.size());
+  match_rest(of_query.dark, of_place.dark, max_ratio, look.dark);
+  matches = matches_;
+  match_rest(of_query.bright, of_place.bright, max_ratio, look.bright);
+  append_bright(query, place, matches);
+}
+
+void FeatureMatcher::match_strongest(const Features& query, const Features& place, double max_ratio,
+                                     std::size_t strongest, FirstLook& look) {
   const Groups of_query = strongest_of(query, strongest);
   const Groups of_place = strongest_of(place, strongest);
-  asked_.resize(std::max(of_query.dark.size(), of_query.bright.size()));
-  std::iota(asked_.begin(), asked_.end(), 0);
-  const std::span<const int> all = asked_;
-  match_group(of_query.dark, all.first(of_query.dark.size()), of_place.dark, max_ratio);
-  matches = matches_;
-  match_group(of_query.bright, all.first(of_query.bright.size()), of_place.bright, max_ratio);
-  append_bright(query, place, matches);
+  const auto match_noting = [&](Descriptors query_group, Descriptors place_group,
+                                FirstLook::Group& noted) {
+    noted.num_query = place_group.empty() ? 0 : query_group.size();
+    noted.num_place = place_group.size();
+    noted.nearest.clear();
+    match_group(query_group, first_numbers(query_group.size()), place_group, max_ratio, &noted);
+  };
+  match_noting(of_query.dark, of_place.dark, look.dark);
+  look.matches = matches_;
+  match_noting(of_query.bright, of_place.bright, look.bright);
+  append_bright(query, place, look.matches);
 }
 
 void FeatureMatcher::match_some(const Features& query, std::span<const int> asked,

@@ -17,8 +17,15 @@ class FeatureMatcher {
  public:
   explicit FeatureMatcher(const Kernels& kernels) : kernels_(kernels) {}
 
-  /// Of `query` and `place`, about so many of the strongest features take part.
-  void match(const Features& query, const Features& place, double max_ratio, std::size_t strongest,
+  void match(const Features& query, const Features& place, double max_ratio,
+             std::vector<Match>& matches);
+
+  /// Of `query` and `place`, so many of the strongest features take part at most.
+  void match_strongest(const Features& query, const Features& place, double max_ratio,
+                       std::size_t strongest, FirstLook& look);
+
+  /// As match(), after a first look at the same pair.
+  void match(const Features& query, const Features& place, double max_ratio, const FirstLook& look,
              std::vector<Match>& matches);
 
   /// Of the matches of all features, those of the query's features `asked`, in rising order.
@@ -29,13 +36,19 @@ class FeatureMatcher {
   using Descriptors = std::span<const Descriptor>;
 
   void match_group(Descriptors query, std::span<const int> asked, Descriptors place,
-                   double max_ratio);
+                   double max_ratio, FirstLook::Group* noted = nullptr);
+  void match_rest(Descriptors query, Descriptors place, double max_ratio,
+                  const FirstLook::Group& known);
   void find_one_way(Descriptors query, std::span<const int> asked, Descriptors place,
-                    double max_ratio);
+                    double max_ratio, FirstLook::Group* noted);
+  void keep_distinct(std::span<const int> asked, const NearestTwo& nearest, double max_ratio);
   void keep_mutual(Descriptors query, Descriptors place, double max_ratio);
   void append_bright(const Features& query, const Features& place,
                      std::vector<Match>& matches) const;
+  std::span<const int> first_numbers(std::size_t count);
   void find_constants(Descriptors descriptors);
+  void find_nearest(Descriptors query, std::span<const int> asked, Descriptors place,
+                    NearestTwo& nearest) const;
 
   const Kernels& kernels_;
   std::vector<std::int32_t> constants_;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "loopbit/kernels.hpp"
 
@@ -16,8 +15,6 @@ namespace {
 
 /// Seven matches always have an epipolar geometry, so only more can speak for one.
 constexpr std::size_t kMinMatchesForGeometry = 8;
-/// As many of the strongest features as there are.
-constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
 
 const Keypoint& keypoint(const Features& features, int index) {
   return features.keypoints[static_cast<std::size_t>(index)];
@@ -132,13 +129,18 @@ class Verifier::Impl {
   }
 
   void match(const Features& query, const Features& place, Verification& result) {
-    matcher_.match(query, place, options_.max_ratio, kAll, result.matches);
+    matcher_.match(query, place, options_.max_ratio, result.matches);
     clear_geometry(result);
   }
 
-  void match_strongest(const Features& query, const Features& place, Verification& result) {
-    matcher_.match(query, place, options_.max_ratio,
-                   static_cast<std::size_t>(options_.first_look_keypoints), result.matches);
+  void match_strongest(const Features& query, const Features& place, FirstLook& look) {
+    matcher_.match_strongest(query, place, options_.max_ratio,
+                             static_cast<std::size_t>(options_.first_look_keypoints), look);
+  }
+
+  void match(const Features& query, const Features& place, const FirstLook& look,
+             Verification& result) {
+    matcher_.match(query, place, options_.max_ratio, look, result.matches);
     clear_geometry(result);
   }
 
@@ -180,8 +182,13 @@ void Verifier::match(const Features& query, const Features& place, Verification&
   impl_->match(query, place, result);
 }
 
-void Verifier::match_strongest(const Features& query, const Features& place, Verification& result) {
-  impl_->match_strongest(query, place, result);
+void Verifier::match_strongest(const Features& query, const Features& place, FirstLook& look) {
+  impl_->match_strongest(query, place, look);
+}
+
+void Verifier::match(const Features& query, const Features& place, const FirstLook& look,
+                     Verification& result) {
+  impl_->match(query, place, look, result);
 }
 
 void Verifier::match_some(const Features& query, std::span<const int> asked, const Features& place,
@@ -195,7 +202,7 @@ void Verifier::find_geometry(const Features& query, const Features& place, Verif
 
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio) {
   std::vector<Match> matches;
-  FeatureMatcher(active_kernels()).match(query, place, max_ratio, kAll, matches);
+  FeatureMatcher(active_kernels()).match(query, place, max_ratio, matches);
   return matches;
 }
 

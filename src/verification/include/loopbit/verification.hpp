@@ -58,6 +58,21 @@ struct Verification {
   double explained_share = 0;  ///< see explained_share()
 };
 
+/// What the strongest features of two images have in common, and what a full match of the two need
+/// not find again. Of 600 features each, of which 300 are strongest, 6 KB.
+struct FirstLook {
+  /// Features with one sign of the Laplacian.
+  struct Group {
+    std::size_t num_query = 0;  ///< strongest features of the query ...
+    std::size_t num_place = 0;  ///< ... whose neighbours were sought among so many of the place
+    std::vector<NearestTwo> nearest;  ///< of kMatchLanes features each, in order
+  };
+
+  std::vector<Match> matches;  ///< one to one
+  Group dark;
+  Group bright;
+};
+
 /// Mutual best matches by the distance of descriptors that pass the ratio test from either side;
 /// only features with the same sign of the Laplacian are compared. Each feature is in one match at
 /// most: one-way matches gather on few points and fake inliers. Equally near features are ambiguous
@@ -103,7 +118,11 @@ class Verifier {
   void match(const Features& query, const Features& place, Verification& result);
 
   /// The same for the strongest `first_look_keypoints` features of each, in a fraction of the time.
-  void match_strongest(const Features& query, const Features& place, Verification& result);
+  void match_strongest(const Features& query, const Features& place, FirstLook& look);
+
+  /// As match(), in three quarters of the time, after match_strongest() of the same pair.
+  void match(const Features& query, const Features& place, const FirstLook& look,
+             Verification& result);
 
   /// Of what match() finds, the matches of the query's features `asked` (indices, rising), in the
   /// time of so many features.
