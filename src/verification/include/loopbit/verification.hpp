@@ -120,7 +120,7 @@ class Verifier {
   /// The same for the strongest `first_look_keypoints` features of each, in a fraction of the time.
   void match_strongest(const Features& query, const Features& place, FirstLook& look);
 
-  /// As match(), in three quarters of the time, after match_strongest() of the same pair.
+  /// As match(), after match_strongest() of the same pair, whose neighbours are not sought again.
   void match(const Features& query, const Features& place, const FirstLook& look,
              Verification& result);
 
