@@ -16,17 +16,19 @@ namespace {
 
 constexpr int kJpegQuality = 75;
 
-/// 8 bits, one channel or three; of 16 bits the range that gray_image() shows the detector.
+/// 8 bits, one channel or three; of 16 bits the range that gray_image() shows the detector, or all
+/// of them where there is no contrast.
 cv::Mat displayable(const cv::Mat& image) {
   cv::Mat shown = image;
   if (image.channels() == 4) cv::cvtColor(image, shown, cv::COLOR_BGRA2BGR);
   if (shown.depth() != CV_16U) return shown;
   cv::Mat gray = shown;
   if (shown.channels() == 3) cv::cvtColor(shown, gray, cv::COLOR_BGR2GRAY);
-  const auto [dark, bright] = gray_range(gray);
-  const double scale = 255.0 / (bright - dark);
+  GrayRange range = gray_range(gray);
+  if (range.bright == range.dark + 1) range = {};
+  const double scale = 255.0 / (range.bright - range.dark);
   cv::Mat eight_bit;
-  shown.convertTo(eight_bit, CV_8U, scale, -scale * dark);
+  shown.convertTo(eight_bit, CV_8U, scale, -scale * range.dark);
   return eight_bit;
 }
 
