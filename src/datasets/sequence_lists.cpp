@@ -109,9 +109,9 @@ ImageList list_kitti(const fs::path& folder, std::string_view camera) {
                             "to go without times.",
                             file.string(), times.size(), list.images.size(), camera));
   }
+  // Where images are missing, their names still tell the rows of the others.
+  const bool is_whole = times.size() == list.images.size();
   for (std::size_t i = 0; i < list.images.size(); ++i) {
-    // Where images are missing, their names still tell the rows of the others.
-    const bool is_whole = times.size() == list.images.size();
     const std::size_t row = is_whole ? i : number_of(list.images[i].name).value_or(i);
     if (row >= times.size()) {
       throw Error(ErrorKind::input,

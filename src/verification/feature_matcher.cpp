@@ -98,15 +98,14 @@ void FeatureMatcher::find_one_way(Descriptors query, std::span<const int> asked,
 void FeatureMatcher::keep_mutual(Descriptors query, Descriptors place, double max_ratio) {
   find_constants(query);
   NearestTwo nearest;
-  Lanes lanes{};
+  std::array<int, kMatchLanes> found{};
   std::size_t kept = 0;
   for (std::size_t begin = 0; begin < matches_.size(); begin += kMatchLanes) {
     const std::size_t count = std::min(kMatchLanes, matches_.size() - begin);
     for (std::size_t lane = 0; lane < count; ++lane) {
-      lanes[lane] = place[static_cast<std::size_t>(matches_[begin + lane].place)];
+      found[lane] = matches_[begin + lane].place;
     }
-    kernels_.nearest_two(lanes.front().data(), query.front().data(), constants_.data(),
-                         query.size(), nearest);
+    find_nearest(place, std::span(found).first(count), query, nearest);
     for (std::size_t lane = 0; lane < count; ++lane) {
       const Match match = matches_[begin + lane];
       if (nearest.index[lane] != match.query || !is_distinct(nearest, lane, max_ratio)) continue;
