@@ -16,6 +16,7 @@ import itertools
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
@@ -58,10 +59,22 @@ def fingerprint(entry, files, common):
     return digest.hexdigest()
 
 
-def check(source, stamp, build, options):
+def entries_of(build):
+    """How each source is compiled, or would be: CMake compiles some together."""
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        file = pathlib.Path(entry["file"])
+        if file.parent.name != "Unity":
+            yield entry
+            continue
+        for source in re.findall(r'^#include "(.+)"$', file.read_text(), re.MULTILINE):
+            yield {**entry, "file": source,
+                   "command": entry["command"].replace(entry["file"], source)}
+
+
+def check(source, stamp, flags, options):
     """What clang-tidy found in a source, or nothing, which the stamp then remembers."""
     result = subprocess.run(
-        [TIDY, "--quiet", *options, "-p", build, source], capture_output=True, text=True
+        [TIDY, "--quiet", *options, source, "--", *flags], capture_output=True, text=True
     )
     if result.returncode == 0:
         stamp.touch()
@@ -86,12 +99,17 @@ def split_flags(entry):
     return places, tuple(others)
 
 
+def flags_of(places, others):
+    """Flags for clang-tidy, of all places in the order in which they first stand."""
+    return [*itertools.chain(*dict.fromkeys(itertools.chain(*places))), *others]
+
+
 def check_batch(batch, pending, build):
     """As check(), of several sources together, with flags for all. Where that finds faults, or they
     cannot be compiled together, by halves."""
     sources, flags = batch
     if len(sources) == 1:
-        return [check(sources[0], pending[sources[0]], build, QUICK)]
+        return [check(sources[0], pending[sources[0]], flags, QUICK)]
     text = "".join(f'#include "{source}"\n' for source in sources)
     together = build / "tidy_batches" / f"{hashlib.sha256(text.encode()).hexdigest()}.cpp"
     together.write_text(text)
@@ -116,8 +134,7 @@ def batches(todo):
     for others, entries in by_others.items():
         for first in range(0, len(entries), BATCH_SIZE):
             batch = entries[first:first + BATCH_SIZE]
-            places = dict.fromkeys(place for _, places in batch for place in places)
-            yield [source for source, _ in batch], [*itertools.chain(*places), *others]
+            yield [source for source, _ in batch], flags_of([places for _, places in batch], others)
 
 
 def main():
@@ -137,7 +154,7 @@ def main():
     stamps.mkdir(exist_ok=True)
 
     todo, pending, passed = {}, {}, set()
-    for entry in json.loads((build / "compile_commands.json").read_text()):
+    for entry in entries_of(build):
         source = pathlib.Path(entry["file"])
         if not is_ours(source) or source.is_relative_to(build):
             continue
@@ -156,10 +173,13 @@ def main():
     for stale in set(stamps.iterdir()) - passed:
         stale.unlink()
 
+    def check_alone(source):
+        places, others = split_flags(todo[source])
+        return check(source, pending[source], flags_of([places], others), options)
+
     with ThreadPoolExecutor(arguments.jobs) as pool:
         if arguments.all:
-            findings = list(pool.map(lambda source: check(source, pending[source], build, options),
-                                     todo))
+            findings = list(pool.map(check_alone, todo))
         else:
             (build / "tidy_batches").mkdir(exist_ok=True)
             # Those of the command, which come last, take longest.

@@ -33,7 +33,7 @@ namespace py = pybind11;
 using Path = std::filesystem::path;
 using OnDetection = std::function<void(const Detection&)>;
 using OnBadFrame = std::function<void(const Text&)>;
-using Positions = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using PositionRows = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Free = py::call_guard<py::gil_scoped_release>;
 
 /// What Python is told between two frames.
@@ -83,7 +83,7 @@ void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_ba
   recorded.detect(source, listener, keep_evidence, never);
 }
 
-void keep_positions(RecordedRun& recorded, const Positions& positions_m) {
+void keep_positions(RecordedRun& recorded, const PositionRows& positions_m) {
   std::vector<std::optional<cv::Vec3d>> rows(static_cast<std::size_t>(positions_m.shape(0)));
   for (py::ssize_t row = 0; row < positions_m.shape(0); ++row) {
     const cv::Vec3d position(positions_m.at(row, 0), positions_m.at(row, 1),
