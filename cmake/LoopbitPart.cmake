@@ -27,7 +27,7 @@ function(loopbit_export_only_public target headers)
   set(public ${CMAKE_CURRENT_BINARY_DIR}/public.hpp)
   file(CONFIGURE OUTPUT ${public} @ONLY
        CONTENT "#pragma GCC visibility push(default)\n@includes@\n#pragma GCC visibility pop\n")
-  target_compile_options(${target} PRIVATE -include ${public})
+  target_compile_options(${target} PRIVATE "SHELL:-include \"${public}\"")
   set_target_properties(${target} PROPERTIES CXX_VISIBILITY_PRESET hidden
                                              VISIBILITY_INLINES_HIDDEN ON)
 endfunction()
