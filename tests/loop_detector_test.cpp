@@ -4,13 +4,17 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <fstream>
 #include <limits>
+#include <new>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
@@ -262,6 +266,23 @@ TEST(LoopDetector, LoopIsWhereAllNeighboursTellThatItIs) {
             static_cast<std::size_t>(detection.matches));
 }
 
+TEST(LoopDetector, SkippedFramesSayNothingOfThePlacesBesideThem) {
+  constexpr int kStepPx = 20;
+  constexpr int kFrames = 30;
+  const cv::Mat1b scene = textured_image({kFrames * kStepPx + 320, 240}, 1);
+  const auto passing_view = [&](int frame) {
+    return scene(cv::Rect(frame * kStepPx, 0, 320, 240)).clone();
+  };
+  LoopDetector detector(short_window_options());
+  for (int frame = 0; frame < kFrames; ++frame) {
+    frame == 15 ? detector.skip() : detector.process(passing_view(frame));
+  }
+  detector.process(view(5));
+  for (const int frame : {13, 14, 16, 17}) {
+    EXPECT_EQ(detector.query(passing_view(frame)).match, frame);
+  }
+}
+
 TEST(LoopDetector, OfPlacesThatWouldDoTheOneThatShowsMostIsTheLoop) {
   LoopDetectorOptions options = short_window_options();
   options.decision.min_score = 8;
@@ -458,6 +479,44 @@ TEST(LoopDetector, UnusableImageThrowsAndChangesNothing) {
   }
   expect_error(ErrorKind::input, {"31 x 31"}, [&] { detector.process(cv::Mat1b(31, 31, 5)); });
 }
+
+// The sanitizers take memory of their own.
+#ifndef LOOPBIT_SANITIZED
+/// Refuses memory in large pieces while it lives.
+class LittleMemory {
+ public:
+  LittleMemory() {
+    constexpr std::size_t kMore_bytes = std::size_t{20} << 20U;
+    std::size_t pages = 0;
+    std::ifstream("/proc/self/statm") >> pages;
+    getrlimit(RLIMIT_AS, &before_);
+    const rlimit limit{pages * static_cast<std::size_t>(getpagesize()) + kMore_bytes,
+                       before_.rlim_max};
+    setrlimit(RLIMIT_AS, &limit);
+  }
+  ~LittleMemory() { setrlimit(RLIMIT_AS, &before_); }
+  LittleMemory(const LittleMemory&) = delete;
+  LittleMemory& operator=(const LittleMemory&) = delete;
+  LittleMemory(LittleMemory&&) = delete;
+  LittleMemory& operator=(LittleMemory&&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST(LoopDetector, WhereMemoryForPlacesIsRefusedNothingChanges) {
+  LoopDetector undisturbed(fast_options());
+  LoopDetector detector(fast_options());
+  static_cast<void>(detector.query(view(0)));  // what it works in is there
+  {
+    const LittleMemory little;
+    EXPECT_THROW(detector.process(view(0)), std::bad_alloc);
+    EXPECT_THROW(detector.skip(), std::bad_alloc);
+  }
+  EXPECT_EQ(detector.size(), 0);
+  expect_same_answers(process_all(detector, two_laps()), process_all(undisturbed, two_laps()));
+}
+#endif
 
 TEST(LoopDetector, BlankImagesAreNeverLoops) {
   LoopDetector detector = after_places(0, kLap - 1, fast_options());

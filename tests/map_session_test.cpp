@@ -182,6 +182,21 @@ TEST_F(MapSession, FeaturesFoundLostDuringASessionAreTold) {
   EXPECT_EQ(MapReader(path("map.db")).sessions().size(), 2U);
 }
 
+TEST_F(MapSession, AFrameThatCouldNotBeReadIsNoDamage) {
+  constexpr std::size_t kBytes = std::size_t{256} << 20U;  // of features that are kept in memory
+  constexpr int kFrames = 4;
+  auto large = std::make_shared<Features>();
+  large->descriptors.resize(kBytes / kFrames / sizeof(Descriptor));
+  large->keypoints.resize(large->descriptors.size());
+  MapWriter map(path("map.db"), fast_options(), "drive");
+  map.for_each_earlier_place([](const SessionFrame&, const BinaryContent&) {});
+  map.add({.frame = 0, .status = Status::unreadable}, {}, std::make_shared<Features>(), {});
+  for (int frame = 1; frame <= kFrames; ++frame) map.add({.frame = frame}, {}, large, {});
+  map.flush();
+  EXPECT_TRUE(map.features(0)->keypoints.empty());
+  EXPECT_EQ(map.damage(), std::vector<std::string>{});
+}
+
 TEST_F(MapSession, MatchesSupportEachOtherWithinASessionOnly) {
   const auto last_session = [&](const std::string& map, std::initializer_list<int> ends) {
     int first = 0;

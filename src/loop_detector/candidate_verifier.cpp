@@ -111,26 +111,34 @@ VerifiedCandidate CandidateVerifier::located(const Query& query, const VerifiedC
 
 /// For each place, its matches averaged with those of the places beside it, at falling weight. One
 /// place may have more matches than the next by chance, but what is in view is so from all of them.
+/// One without keypoints, which could not be read, says nothing of the others.
 std::vector<double> CandidateVerifier::shared_around(const Query& query,
                                                      const std::vector<Candidate>& around) {
-  std::vector<int> matches;
-  matches.reserve(around.size());
+  struct Place {
+    std::ptrdiff_t matches;
+    bool speaks;
+  };
+  std::vector<Place> places;
+  places.reserve(around.size());
   for (const Candidate& c : around) {
-    matches.push_back(static_cast<int>(first_look(query, c.place).matches.size()));
+    places.push_back({std::ssize(first_look(query, c.place).matches),
+                      !places_.features(c.place).keypoints.empty()});
   }
   std::vector<double> shared;
-  shared.reserve(matches.size());
-  for (std::ptrdiff_t middle = 0; middle < std::ssize(matches); ++middle) {
+  shared.reserve(places.size());
+  for (std::ptrdiff_t middle = 0; middle < std::ssize(places); ++middle) {
     const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, middle - kReach);
-    const std::ptrdiff_t last = std::min(std::ssize(matches) - 1, middle + kReach);
+    const std::ptrdiff_t last = std::min(std::ssize(places) - 1, middle + kReach);
     std::ptrdiff_t sum = 0;
     std::ptrdiff_t weights = 0;
     for (std::ptrdiff_t i = first; i <= last; ++i) {
+      const Place& place = places[static_cast<std::size_t>(i)];
+      if (!place.speaks) continue;
       const std::ptrdiff_t weight = kReach + 1 - std::abs(i - middle);
-      sum += weight * matches[static_cast<std::size_t>(i)];
+      sum += weight * place.matches;
       weights += weight;
     }
-    shared.push_back(static_cast<double>(sum) / static_cast<double>(weights));
+    shared.push_back(weights == 0 ? 0.0 : static_cast<double>(sum) / static_cast<double>(weights));
   }
   return shared;
 }

@@ -255,14 +255,21 @@ class LoopDetector::Impl {
     }
   }
 
+  /// All of it or, where it throws, nothing.
   PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection,
                     const cv::Mat& image) {
-    memory_.add(detection, content, std::move(features), image);
+    index_.reserve_next();
     // The time of a frame that nothing matches may be wrong, and would shut out those after it.
     const double last_s =
         times_s_.empty() ? -std::numeric_limits<double>::infinity() : times_s_.back();
     times_s_.push_back(
         detection.status == Status::unreadable ? last_s : detection.timestamp_s.value_or(0.0));
+    try {
+      memory_.add(detection, content, std::move(features), image);
+    } catch (...) {
+      times_s_.pop_back();
+      throw;
+    }
     return index_.add(content);
   }
 

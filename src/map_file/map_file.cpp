@@ -192,7 +192,9 @@ class MapWriter::Impl {
                   .features = features,
                   .image = keeps_images_ ? halved_to_picture(image) : cv::Mat()});
     places.keep(places.size(), std::move(features));
-    places.add(first_place_ + detection.frame, {session_, detection.frame});
+    const bool has_row = detection.status != Status::unreadable;
+    places.add(has_row ? first_place_ + detection.frame : StoredFeatures::kNoRow,
+               {session_, detection.frame});
     ++frames_;
   }
 

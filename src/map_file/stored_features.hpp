@@ -25,6 +25,9 @@ class StoredFeatures {
   /// at `path` are numbered for one detector.
   void begin(const std::string& path);
 
+  /// What stands for the row of a place that has none, as it has no features.
+  static constexpr std::int64_t kNoRow = 0;
+
   /// Gives the row `id`, a place of `at`, the next number.
   void add(std::int64_t id, const SessionFrame& at) { places_.push_back({id, at}); }
 

@@ -25,6 +25,8 @@ PlaceIndex& PlaceIndex::operator=(PlaceIndex&&) noexcept = default;
 
 PlaceId PlaceIndex::add(const BinaryContent& content) { return store_->add(content); }
 
+void PlaceIndex::reserve_next() { store_->reserve_next(); }
+
 PlaceId PlaceIndex::size() const { return store_->size(); }
 
 const BinaryContent& PlaceIndex::content(PlaceId place) const {

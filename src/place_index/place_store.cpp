@@ -21,14 +21,18 @@ PlaceStore::PlaceStore() : PlaceStore(nullptr) {}
 PlaceStore::PlaceStore(std::unique_ptr<ScratchFile> file)
     : file_(std::move(file)), chunks_(std::make_unique_for_overwrite<Chunk[]>(kMaxChunks)) {}
 
-PlaceId PlaceStore::add(const BinaryContent& content) {
+void PlaceStore::reserve_next() {
   const PlaceId id = size_.load(std::memory_order_relaxed);
   if (id == std::numeric_limits<PlaceId>::max()) {
     throw std::length_error("a place index holds at most 2,147,483,647 places");
   }
-  const auto place = static_cast<std::size_t>(id);
-  if (place % kChunkPlaces == 0) take_chunk(place / kChunkPlaces);
+  if (static_cast<std::size_t>(id) / kChunkPlaces == num_chunks()) take_chunk();
+}
 
+PlaceId PlaceStore::add(const BinaryContent& content) {
+  reserve_next();
+  const PlaceId id = size_.load(std::memory_order_relaxed);
+  const auto place = static_cast<std::size_t>(id);
   const Chunk& chunk = chunks_[place / kChunkPlaces];
   chunk.contents[place % kChunkPlaces] = content;
   const BlockCounts blocks = block_counts(content);
@@ -41,7 +45,8 @@ PlaceId PlaceStore::add(const BinaryContent& content) {
   return id;
 }
 
-void PlaceStore::take_chunk(std::size_t number) {
+void PlaceStore::take_chunk() {
+  const std::size_t number = num_chunks();
   constexpr std::size_t kContentsBytes = kChunkPlaces * sizeof(BinaryContent);
   memory_.reserve(memory_.size() + 2);
   MappedMemory contents = file_ ? file_->extend(kContentsBytes) : MappedMemory(kContentsBytes);

@@ -50,6 +50,9 @@ class PlaceStore {
   /// ScratchFile do, and stays as it was.
   PlaceId add(const BinaryContent& content);
 
+  /// The next add() does not throw then. Throws as it does.
+  void reserve_next();
+
   [[nodiscard]] PlaceId size() const { return size_.load(std::memory_order_acquire); }
 
   // Below: 0 <= place < size(), and stretches all of whose places are below size().
@@ -120,7 +123,8 @@ class PlaceStore {
     const std::size_t in_chunk = stretch & ((std::size_t{1} << bits) - 1);
     return {chunks_[stretch >> bits].bounds, kFirstRecord[level] + in_chunk};
   }
-  void take_chunk(std::size_t number);
+  [[nodiscard]] std::size_t num_chunks() const { return memory_.size() / 2; }
+  void take_chunk();
   void extend_stretches(std::size_t place, const Growing& counts);
   void extend_coarse_stretch(std::size_t place, const CoarseCounts& counts);
 

@@ -49,7 +49,8 @@ class LoopDetector {
   /// before the last one; needed only where the exclusion window is given in seconds.
   /// `evidence`: if not null, is given what the answer rests on, at the cost of one more
   /// verification. Throws Error (kind input), and stays as it was, if the image or the time cannot
-  /// be used, and what MapStorage::add throws.
+  /// be used; so it does where memory for another place is refused (std::bad_alloc), and where
+  /// MapStorage::add throws.
   Detection process(const cv::Mat& image, std::optional<double> timestamp_s = std::nullopt,
                     Evidence* evidence = nullptr);
 

@@ -88,6 +88,10 @@ class PlaceIndex {
   /// contents is full.
   PlaceId add(const BinaryContent& content);
 
+  /// Takes the memory that the next place needs, so that the next add() does not throw: for who
+  /// keeps something else in step with the places. Throws as add() does.
+  void reserve_next();
+
   [[nodiscard]] PlaceId size() const;
 
   /// Valid as long as the index. Throws std::out_of_range unless 0 <= place < size().
