@@ -16,6 +16,7 @@
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/folder_watch.hpp"
 #include "loopbit/image_source.hpp"
 
 namespace loopbit {
@@ -483,6 +484,24 @@ TEST_F(Datasets, FilesOverTheLimitAreNotRead) {
   write("x.png", "");
   fs::resize_file(path("x.png"), (std::uintmax_t{512} << 20U) + 1);  // sparse: takes no space
   expect_frame_error(read_one("x.png"), "at most 536870912");
+}
+
+TEST_F(Datasets, AWatchForgetsImagesThatAreGone) {
+  write("a.png", "1");
+  const fs::path file = fs::path(path()) / "a.png";
+  const auto written = fs::last_write_time(file);
+  FolderWatch watch(path());
+  const auto arrived = [&] {
+    std::size_t images = watch.arrived().size();
+    return images + watch.arrived().size();
+  };
+  EXPECT_EQ(arrived(), 1U);
+  EXPECT_EQ(arrived(), 0U);
+  fs::remove(file);
+  EXPECT_EQ(arrived(), 0U);
+  write("a.png", "1");
+  fs::last_write_time(file, written);
+  EXPECT_EQ(arrived(), 1U) << "the same again, for all that can be seen";
 }
 
 TEST_F(Datasets, ForbiddenFilesAreNamed) {

@@ -29,6 +29,7 @@ std::vector<std::string> FolderWatch::arrived() {
   std::error_code error;
   fs::directory_iterator entry(folder_, error);
   std::vector<std::string> names;
+  std::map<std::string, File> there;
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
     const std::string name = entry->path().filename().string();
     if (name.starts_with('.') || !datasets::is_image_name(name)) continue;
@@ -37,8 +38,9 @@ std::vector<std::string> FolderWatch::arrived() {
     const fs::file_time_type written =
         vanished ? fs::file_time_type() : entry->last_write_time(vanished);
     if (vanished) continue;
-    const auto [found, is_new] = files_.try_emplace(name, File{bytes, written});
-    File& file = found->second;
+    const auto known = files_.find(name);
+    const bool is_new = known == files_.end();
+    File& file = there[name] = is_new ? File{bytes, written} : known->second;
     const bool settled = !is_new && bytes > 0 && file.bytes == bytes && file.written == written;
     if (!settled) {
       file = {bytes, written};
@@ -53,6 +55,7 @@ std::vector<std::string> FolderWatch::arrived() {
                 fmt::format("The folder '{}' cannot be read any more ({}); check that it is there.",
                             folder_, error.message()));
   }
+  files_ = std::move(there);  // those that are gone are forgotten
   std::sort(names.begin(), names.end(), datasets::natural_less);
   for (std::string& name : names) name = (fs::path(folder_) / name).string();
   return names;
