@@ -106,7 +106,10 @@ class CommandLineTest(CommandTest):
                          json.loads(config.read_text()))
 
     def test_progress_is_a_bar_on_a_terminal(self):
-        leader, follower = pty.openpty()
+        try:
+            leader, follower = pty.openpty()
+        except OSError as error:
+            self.skipTest(f"no terminal here: {error}")
         subprocess.run([LOOPBIT, "run", self.images, "--out", self.out, "--limit", "40"],
                        check=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                        stderr=follower)
@@ -428,6 +431,13 @@ class CommandLineTest(CommandTest):
     def test_images_are_not_written_over_others(self):
         ran = loopbit("demo", *WORLD, "--write-images", self.dataset)
         self.assert_fails(ran, 4, self.dataset)
+
+    def test_writing_images_takes_no_settings_of_the_detector(self):
+        for flags in (["--set", "nonsense=1"], ["--map", self.scratch / "x.db"],
+                      ["--preset", "paper"], ["--no-report"]):
+            ran = loopbit("demo", *WORLD, "--write-images", self.scratch / "town", *flags)
+            self.assert_fails(ran, 2, flags[0], "--write-images")
+        self.assertFalse((self.scratch / "town").exists())
 
     def test_ctrl_c_ends_cleanly_and_keeps_what_was_found(self):
         process = subprocess.Popen([LOOPBIT, "run", self.images, "--out", self.out],

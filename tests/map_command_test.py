@@ -130,7 +130,7 @@ class MapCommandTest(CommandTest):
         table = loopbit("query", self.map, image)
         self.assertEqual(table.returncode, 0, table.stderr)
         first = table.stdout.splitlines()[1].split()
-        self.assertEqual(first[:4], ["000007.png", "loop", "1", "7"])
+        self.assertEqual(first[:4], [str(image), "loop", "1", "7"])
         ran = loopbit("query", self.map, image, "--json", "--places", "2")
         answer = json.loads(ran.stdout)
         self.assertEqual(answer["status"], "loop")
@@ -146,6 +146,27 @@ class MapCommandTest(CommandTest):
         self.assertEqual([a["status"] for a in answers], ["unreadable", "loop"])
         self.assertIn("broken.png", ran.stderr)
         self.assertEqual(loopbit("query", self.map, broken).returncode, 3)
+
+    def test_query_goes_on_after_an_image_that_is_not_there(self):
+        ran = loopbit("query", self.map, self.scratch / "none.png", self.laps[0] / "000001.png",
+                      "--json")
+        self.assertEqual(ran.returncode, 0)
+        answers = [json.loads(line) for line in ran.stdout.splitlines()]
+        self.assertEqual([a["status"] for a in answers], ["unreadable", "loop"])
+        self.assertIn("does not exist", ran.stderr)
+
+    def test_query_tells_images_of_one_name_apart(self):
+        folders = []
+        for number in (1, 2):
+            folder = self.scratch / str(number)
+            folder.mkdir()
+            shutil.copy(self.laps[0] / f"00000{number}.png", folder / "same.png")
+            folders.append(folder)
+        images = [folder / "same.png" for folder in folders]
+        for asked in (images, folders):
+            ran = loopbit("query", self.map, *asked, "--json")
+            answers = [json.loads(line) for line in ran.stdout.splitlines()]
+            self.assertEqual([a["image"] for a in answers], [str(image) for image in images])
 
     def test_query_says_what_is_missing(self):
         self.assert_fails(loopbit("query", self.scratch / "none.db", "x.png"), 3, "none.db", "--map")

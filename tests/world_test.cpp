@@ -409,6 +409,9 @@ TEST(WorldOptionsCheck, RefusesADriveTooShortForItsLapsAndSaysWhatWouldDo) {
   options.frames = 100;
   options.spacing_m = 2.39;
   EXPECT_EQ(refusal_of(options), "");
+  options.frames = 4;
+  const std::string refusal = refusal_of(options);
+  EXPECT_NE(refusal.find("take 100 frames or more."), std::string::npos) << refusal;
 }
 
 TEST(WorldSource, YieldsTheWholeDrive) {

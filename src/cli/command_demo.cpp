@@ -23,6 +23,7 @@ struct DemoFlags {
   std::string images;
   WorldOptions world;
   TruthFlags truth;
+  std::vector<CLI::Option*> of_detector;
 };
 
 std::string describe(const World& world) {
@@ -39,6 +40,18 @@ Positions positions(const World& world, std::size_t frames) {
     positions.emplace_back(cv::Vec3d(pose.x_m, pose.y_m, 0.0));
   }
   return positions;
+}
+
+/// Throws Error (kind option) if one is given that says how to detect.
+void check_nothing_is_detected(const DemoFlags& flags) {
+  for (const CLI::Option* option : flags.of_detector) {
+    if (option->count() == 0) continue;
+    throw Error(
+        ErrorKind::option,
+        fmt::format("{} is about detecting, which --write-images does not do; leave out one "
+                    "of them.",
+                    option->get_name()));
+  }
 }
 
 void write_images(const World& world, const std::string& folder) {
@@ -65,6 +78,7 @@ int demo_command(const DemoFlags& flags, const Arguments& arguments) {
   flags.truth.check(1, static_cast<std::size_t>(std::max(0, options.frames)));
   const auto world = std::make_shared<const World>(options);
   if (!flags.images.empty()) {
+    check_nothing_is_detected(flags);
     write_images(*world, flags.images);
     return success;
   }
@@ -108,6 +122,7 @@ void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
                          ->type_name("DIR")
                          ->capture_default_str();
   flags->session.add_to(*command);
+  flags->of_detector = command->get_options([&](CLI::Option* option) { return option != out; });
   command->add_option("--frames", flags->world.frames, "Frames in the whole drive")
       ->type_name("N")
       ->capture_default_str();

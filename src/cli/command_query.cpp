@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -25,6 +26,8 @@
 
 namespace loopbit::cli {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr std::chrono::milliseconds kWatchPause{50};
 
@@ -110,30 +113,27 @@ class Relocalizer {
     }
   }
 
-  /// All images of `input`.
-  void ask(const std::string& input) { answer_all(*open_source(input)); }
-
-  /// One image, which may be gone again.
-  void ask_arrived(const std::string& image) {
-    std::unique_ptr<ImageSource> source;
+  /// All images of `input`, which is called `name`: an image by that, others by what they are
+  /// called in it.
+  void ask(const std::string& input, const std::string& name) {
     try {
-      source = open_source(image);
+      const auto source = open_source(input);
+      const std::string own_name = fs::path(input).filename().string();
+      for (Frame frame; source->next(frame);) {
+        frame.name = frame.name == own_name ? name : (fs::path(name) / frame.name).string();
+        answer(frame);
+      }
     } catch (const Error& error) {
-      answer({image, {}, {}, error.what()});
-      return flush_stdout();
+      if (error.kind() != ErrorKind::input) throw;
+      answer({name, {}, {}, error.what()});
     }
-    answer_all(*source);
+    flush_stdout();
   }
 
   [[nodiscard]] bool any_readable() const { return any_readable_; }
   [[nodiscard]] const MapReader& map() const { return *map_; }
 
  private:
-  void answer_all(ImageSource& source) {
-    for (Frame frame; source.next(frame);) answer(frame);
-    flush_stdout();
-  }
-
   void answer(const Frame& frame) {
     std::vector<RankedPlace> places;
     Status status = Status::unreadable;
@@ -167,12 +167,14 @@ int query_command(const QueryFlags& flags) {
                 "Which images? Name some, or a folder by --watch, but not both.");
   }
   Relocalizer relocalizer(flags);
-  for (const std::string& image : flags.images) relocalizer.ask(image);
+  for (const std::string& image : flags.images) relocalizer.ask(image, image);
   if (!flags.watch.empty()) {
     const auto& stop = stop_on_signal();
     FolderWatch watch(flags.watch);
     while (!stop) {
-      for (const std::string& image : watch.arrived()) relocalizer.ask_arrived(image);
+      for (const std::string& image : watch.arrived()) {
+        relocalizer.ask(image, fs::path(image).filename().string());
+      }
       std::this_thread::sleep_for(kWatchPause);
     }
   }

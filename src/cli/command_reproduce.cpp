@@ -86,6 +86,16 @@ std::vector<fs::path> entries(const fs::path& folder) {
   return paths;
 }
 
+/// The archives of poses and of calibrations make folders for sequences, too.
+bool has_images(const std::string& sequence) {
+  try {
+    (void)open_source(sequence);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 /// KITTI odometry as it is unpacked: sequences/NN/image_0 and poses/NN.txt, also below `dataset`.
 std::optional<PublicSet> find_kitti(const fs::path& data, std::string_view sequence) {
   for (const char* below : {".", "dataset", "kitti", "KITTI", "kitti/dataset", "KITTI/dataset"}) {
@@ -94,6 +104,7 @@ std::optional<PublicSet> find_kitti(const fs::path& data, std::string_view seque
     const fs::path poses = root / "poses" / (std::string(sequence) + ".txt");
     std::error_code error;
     if (!fs::is_directory(images, error) || !fs::is_regular_file(poses, error)) continue;
+    if (!has_images(images.string())) continue;
     PublicSet set;
     set.images = images.string();
     set.truth.truth = poses.string();
@@ -193,9 +204,9 @@ void print_table(const std::vector<ReproducedRow>& rows) {
   }
 }
 
-int reproduce_command(const ReproduceFlags& flags, const Arguments& arguments) {
-  std::vector<ReproducedRow> rows;
-  std::string missing;
+/// Runs what is there; returns the exit code of the first run that did not end well.
+int run_sets(const ReproduceFlags& flags, const Arguments& arguments,
+             std::vector<ReproducedRow>& rows, std::string& missing) {
   for (const PaperRow& paper : kPaper) {
     const auto set = find_set(flags.data, paper);
     if (!set) {
@@ -210,15 +221,28 @@ int reproduce_command(const ReproduceFlags& flags, const Arguments& arguments) {
       return exit_code;
     rows.push_back({&paper, report_run(session.out)});
   }
-  if (rows.empty()) {
+  return success;
+}
+
+int reproduce_command(const ReproduceFlags& flags, const Arguments& arguments) {
+  std::vector<ReproducedRow> rows;
+  std::string missing;
+  int exit_code = success;
+  try {
+    exit_code = run_sets(flags, arguments, rows, missing);
+  } catch (const Error&) {
+    if (!rows.empty()) print_table(rows);
+    throw;
+  }
+  if (rows.empty() && exit_code == success) {
     throw Error(ErrorKind::input,
                 fmt::format("'{}' holds none of the paper's data sets; see 'loopbit reproduce "
                             "--help' for where they are looked for.",
                             flags.data));
   }
-  print_table(rows);
+  if (!rows.empty()) print_table(rows);
   if (!missing.empty()) fmt::print("\nNot found, and left out:{}\n", missing);
-  return success;
+  return exit_code;
 }
 
 }  // namespace

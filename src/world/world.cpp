@@ -41,6 +41,14 @@ constexpr double kFramesPerSecond = 10.0;
 constexpr std::uint32_t kNodSalt = 0x40dU;
 constexpr std::uint32_t kNoiseSalt = 0x4015eU;
 
+double largest_spacing_m() {
+  double largest = 0;
+  for_each_field<WorldOptions>([&](const auto& field) {
+    if (field.name == std::string_view("spacing_m")) largest = static_cast<double>(field.max);
+  });
+  return largest;
+}
+
 WorldOptions checked(const WorldOptions& options) {
   validate(options, "world");
   if (options.near_place_m < options.same_place_m) {
@@ -52,13 +60,16 @@ WorldOptions checked(const WorldOptions& options) {
   const double circuit_m = options.frames * options.spacing_m / options.laps;
   if (circuit_m >= Circuit::kShortestCircuit_m) return options;
   const double drive_m = Circuit::kShortestCircuit_m * options.laps;
-  throw Error(ErrorKind::option,
-              fmt::format("world: {} frames {} m apart in {} laps make a circuit of {:.0f} m, but "
-                          "the shortest has {} m: take {:.0f} frames or more, or set spacing_m to "
-                          "{:.2f} or more.",
-                          options.frames, options.spacing_m, options.laps, circuit_m,
-                          Circuit::kShortestCircuit_m, std::ceil(drive_m / options.spacing_m),
-                          std::ceil(drive_m / options.frames * 100) / 100));
+  const double least_spacing_m = std::ceil(drive_m / options.frames * 100) / 100;
+  const bool may_be_set = least_spacing_m <= largest_spacing_m();
+  throw Error(
+      ErrorKind::option,
+      fmt::format(
+          "world: {} frames {} m apart in {} laps make a circuit of {:.0f} m, but "
+          "the shortest has {} m: take {:.0f} frames or more{}.",
+          options.frames, options.spacing_m, options.laps, circuit_m, Circuit::kShortestCircuit_m,
+          std::ceil(drive_m / options.spacing_m),
+          may_be_set ? fmt::format(", or set spacing_m to {:.2f} or more", least_spacing_m) : ""));
 }
 
 double wrap_angle(double angle) {
