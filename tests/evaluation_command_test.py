@@ -8,9 +8,10 @@ import os
 import pathlib
 import shutil
 import struct
+import subprocess
 import unittest
 
-from loopbit_command import FRAMES, CommandTest, loopbit, rows
+from loopbit_command import FRAMES, LOOPBIT, CommandTest, loopbit, rows
 
 
 def write_mat(path, name, size, cells, with_string=False):
@@ -125,6 +126,20 @@ class EvaluationCommandTest(CommandTest):
         full = (self.dataset / "truth.csv").read_text().splitlines()[1:]
         queries = {int(line.split(",")[0]) for line in full}
         self.assertEqual(again["positives"], len([query for query in queries if query % 2 == 0]))
+        loops = self.out / "loops.csv"
+        self.assertEqual(self.score(loops, "--truth", self.dataset / "truth.csv"), again)
+        self.assertEqual(self.score(loops)["positives"], again["positives"])
+        in_folder = subprocess.run([LOOPBIT, "eval", "loops.csv", "--json"], cwd=self.out,
+                                   stdout=subprocess.PIPE, check=True)
+        self.assertEqual(json.loads(in_folder.stdout), self.score(self.out))
+        shutil.copy(loops, self.scratch / "copy.csv")
+        alone = self.score(self.scratch / "copy.csv", "--truth", self.dataset / "truth.csv")
+        self.assertNotEqual(alone, again)
+
+    def test_a_list_of_another_sequence_is_noticed(self):
+        beyond = self.file("beyond.csv", f"{FRAMES},3,1\n")
+        ran = loopbit("eval", beyond, "--truth", self.dataset / "poses.txt")
+        self.assert_fails(ran, 3, f"Query {FRAMES}", f"{FRAMES} frames")
 
     def test_a_trajectory_goes_by_the_times_of_the_frames(self):
         data = self.timed_images(20)
@@ -392,6 +407,25 @@ class EvaluationCommandTest(CommandTest):
         (run / "loops.csv").write_text("".join(loops[:7]))  # as of a run that was killed
         self.assertEqual(self.score(run)["positives"], 2)
         self.assertEqual(self.score(run, "--truth", matrix), self.score(run))
+
+    def test_a_sequence_of_which_only_poses_are_there_is_left_out(self):
+        data = self.public_data()
+        sequence = data / "dataset" / "sequences" / "02"
+        sequence.mkdir()
+        (sequence / "times.txt").write_text("0.0\n")
+        (sequence / "calib.txt").write_text("P0:\n")
+        shutil.copy(self.dataset / "poses.txt", data / "dataset" / "poses" / "02.txt")
+        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn("KITTI 02", ran.stdout[ran.stdout.index("Not found"):])
+
+    def test_what_was_run_before_a_set_that_fails_is_printed(self):
+        data = self.public_data()
+        write_mat(data / "City_Centre" / "CityCentreGroundTruth.mat", "truth", 5, [(3, 0)])
+        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
+        self.assert_fails(ran, 3, "CityCentreGroundTruth.mat")
+        table = ran.stdout[ran.stdout.index("Recall in percent"):]
+        self.assertIn("KITTI 00", table)
 
     def test_no_public_data_at_all(self):
         empty = self.scratch / "empty"

@@ -76,6 +76,14 @@ TEST(Evaluate, RevisitsAfterTheEndOfARunDoNotCount) {
   EXPECT_EQ(evaluate(of_frames({}, 10), truth).decision.ignored, 1);
 }
 
+TEST(Evaluate, AListThatGoesBeyondTheTruthIsOfAnotherSequence) {
+  const GroundTruth truth{.same_place = {{6, 0, 0}}, .every = 2, .frames = 8};
+  EXPECT_EQ(evaluate({{loop(3, 0)}, {}}, truth).decision.right, 1);
+  test::expect_error(ErrorKind::input, {"Query 4", "8 frames"}, [&] {
+    evaluate({{loop(3, 0), loop(4, 0)}, {}}, truth);
+  });
+}
+
 TEST(Evaluate, ToleranceIsCountedInFramesFromTheNearestTruePlace) {
   const GroundTruth truth{{{100, 20, 30}}, {}, {}};
   for (const int match : {10, 20, 30, 40}) {

@@ -64,7 +64,8 @@ TEST_F(GroundTruthTest, PlacesAreEarlierFramesInTheColumnsTheirNamesSay) {
     test::expect_error(ErrorKind::input, {"line 1", "last < query"},
                        [&] { read_place_runs(write("runs.csv", row)); });
   }
-  for (const char* names : {"match,query\n", "first,last,query\n"}) {
+  for (const char* names : {"match,query\n", "first,last,query\n", "query,match,score\n",
+                            "query,match,last\n", "frame,place,score\n"}) {
     test::expect_error(ErrorKind::input, {"line 1", "in order"},
                        [&] { read_place_runs(write("runs.csv", names)); });
   }
@@ -80,6 +81,7 @@ TEST(EveryNth, KeepsTheFramesThatWereRead) {
   EXPECT_EQ(thirds.near_place, (std::vector<PlaceRun>{{11, 3, 3}}));
   EXPECT_EQ(thirds.ignored, (std::vector<int>{0, 11}));
   EXPECT_EQ(every_nth(truth, 1).same_place, truth.same_place);
+  EXPECT_EQ(every_nth({.frames = 10}, 3).frames, 4) << "frames 0, 3, 6 and 9";
   EXPECT_EQ(every_nth({{{2147483646, 0, 2147483647}}, {}, {}}, 2).same_place,
             (std::vector<PlaceRun>{{1073741823, 0, 1073741823}}));
   test::expect_error(ErrorKind::option, {"every is 0"}, [&] { every_nth(truth, 0); });

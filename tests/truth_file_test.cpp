@@ -468,10 +468,36 @@ TEST_F(TruthFileTest, ATrajectoryOfFramesWithoutTimesHasARowAFrame) {
   const std::string file = write("trajectory.txt", text);
   TruthOptions options;
   options.poses.min_gap_frames = 1;
-  EXPECT_EQ(read_truth(file, options, Times(5)).same_place,
-            (Runs{{3, 0, 0}, {4, 1, 1}, {5, 2, 2}}));
-  test::expect_error(ErrorKind::input, {"6 poses", "7 frames"},
-                     [&] { read_truth(file, options, Times(7)); });
+  const Runs expected{{3, 0, 0}, {4, 1, 1}, {5, 2, 2}};
+  EXPECT_EQ(read_truth(file, options, Times(6)).same_place, expected);
+  for (const std::size_t frames : {3U, 5U, 7U}) {
+    const std::string named = fmt::format("{} frames", frames);
+    test::expect_error(ErrorKind::input, {file, "6 poses", named.c_str(), "have no times"},
+                       [&] { read_truth(file, options, Times(frames)); });
+  }
+  options.every = 4;
+  options.poses.min_gap_frames = 2;
+  EXPECT_EQ(read_truth(file, options, Times(2)).same_place, expected) << "frames 0 and 4";
+}
+
+TEST_F(TruthFileTest, ReadsStatesOfEuroc) {
+  std::string text = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], and so on\n";
+  for (int i = 0; i < 20; ++i) {
+    text += fmt::format("14036366{:02}000000000,{},0,0,0.5,0.5,0.5,0.5,1,2,3,4,5,6,7,8,9\r\n", i,
+                        7 * (i % 10));
+  }
+  const std::string file = write("data.csv", text);
+  EXPECT_EQ(truth_kind(file), TruthKind::poses);
+  const std::vector<CameraPose> poses = read_poses(file);
+  ASSERT_EQ(poses.size(), 20U);
+  EXPECT_NEAR(poses[3].timestamp_s.value(), 1403636603.0, 1e-6);
+  EXPECT_NEAR(cv::norm(poses[3].position_m - cv::Vec3d(21, 0, 0)), 0, 1e-9);
+  EXPECT_NEAR(cv::norm(poses[3].ahead - cv::Vec3d(1, 0, 0)), 0, 1e-9) << "z turns to x";
+  TruthOptions options;
+  options.poses.min_gap_frames = 1;
+  const Times times_s{1403636601.01, 1403636602.0, 1403636611.0};
+  EXPECT_EQ(read_truth(file, options, times_s).same_place, (Runs{{2, 0, 0}}));
+  expect_input_error(write("data.csv", text + "1,2,3\n"), {"line 22", "EuRoC"});
 }
 
 TEST_F(TruthFileTest, TruthKeepsTheNumbersOfTheWholeSequence) {
@@ -512,6 +538,13 @@ TEST_F(TruthFileTest, OfTwoViewsInTurnTheFirstMayBeReadAlone) {
     EXPECT_EQ(truth.same_place, (Runs{{3, 0, 0}}));
     EXPECT_EQ(truth.every, 1);
   }
+  options.every = 1;
+  for (const std::size_t images : {5U, 8U}) {
+    test::expect_error(ErrorKind::input, {file, "4 frames of 2 rows", "read every 2-th"},
+                       [&] { read_truth(file, options, Times(images)); });
+  }
+  test::expect_error(ErrorKind::input, {file, "4 frames", "has 9 frames"},
+                     [&] { read_truth(file, options, Times(9)); });
   options.every = 3;
   test::expect_error(ErrorKind::option, {"Every 3-th", "2 images"},
                      [&] { read_truth(file, options, Times(2)); });
@@ -535,8 +568,9 @@ TEST_F(TruthFileTest, KindsAreTold) {
 }
 
 TEST_F(TruthFileTest, OtherTextIsRefused) {
-  for (const char* text : {"1\n", "1,2,3,4\n", "1 2 3 4 5 6 7 8 9 10 11\n",
-                           "no ground truth at all\n", "\x01\x02\n"}) {
+  for (const char* text :
+       {"1\n", "1,2,3,4\n", "1 2 3 4 5 6 7 8 9 10 11\n", "0 1 0 0 0 0 1 0 0 0 0 1 0\n",
+        "no ground truth at all\n", "\x01\x02\n"}) {
     SCOPED_TRACE(text);
     expect_input_error(write("truth.txt", text), {"line 1"});
   }

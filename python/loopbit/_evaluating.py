@@ -38,7 +38,8 @@ def read_truth(
     times_s: Times = (),
 ) -> GroundTruth:
     """What is true about a sequence, by a file: rows of query,first,last or query,match; KITTI
-    poses or a TUM trajectory, which needs the frames' times; a loop matrix as .mat, text or image.
+    poses, a TUM trajectory or EuRoC states, which need the frames' times; a loop matrix as .mat,
+    text or image.
 
     A protocol fixes poses and views, which then must not be given. not_false and ignore are files
     of matches that are not wrong, and of queries that are not scored. All files count the frames of
@@ -75,7 +76,9 @@ def read_truth(
     ignored = truth.ignored.tolist()
     if ignore is not None:
         ignored += _loopbit._read_frame_list(ignore)
-    return GroundTruth(truth.same_place.tolist(), near, ignored, truth.unknown, truth.every)
+    return GroundTruth(
+        truth.same_place.tolist(), near, ignored, truth.unknown, truth.every, truth.frames
+    )
 
 
 def check_kind(protocol: str, path: Path) -> None:

@@ -120,7 +120,7 @@ void bind_truth(py::module_& module) {
                           "structured arrays of query, first and last, int32; the frames first to "
                           "last show what frame query shows.")
       .def(py::init([](const ArrayLike& same_place, const ArrayLike& near_place,
-                       const ArrayLike& ignored, const ArrayLike& unknown, int every) {
+                       const ArrayLike& ignored, const ArrayLike& unknown, int every, int frames) {
              check_every(every);
              GroundTruth truth;
              truth.same_place = to_runs(same_place, "same_place");
@@ -128,10 +128,12 @@ void bind_truth(py::module_& module) {
              truth.ignored = to_frames(ignored, "ignored");
              truth.unknown = to_frames(unknown, "unknown");
              truth.every = every;
+             truth.frames = frames;
              return truth;
            }),
            py::arg("same_place"), py::arg("near_place") = py::tuple(),
            py::arg("ignored") = py::tuple(), py::arg("unknown") = py::tuple(), py::arg("every") = 1,
+           py::arg("frames") = 0,
            "From integers of shape (n, 2): query, match; or (n, 3): query, first, last; places are "
            "earlier frames.")
       .def_property_readonly(
@@ -150,11 +152,14 @@ void bind_truth(py::module_& module) {
       .def_readonly("every", &GroundTruth::every,
                     "Of the sequence's frames every so-many-th was read: the k-th of them is frame "
                     "k * every here.")
+      .def_readonly("frames", &GroundTruth::frames,
+                    "How many frames of the sequence are told of; 0 = not known.")
       .def("__repr__", [](const GroundTruth& self) {
         return fmt::format(
-            "GroundTruth(same_place={} rows, near_place={} rows, ignored={}, unknown={}, every={})",
+            "GroundTruth(same_place={} rows, near_place={} rows, ignored={}, unknown={}, every={}, "
+            "frames={})",
             self.same_place.size(), self.near_place.size(), self.ignored.size(),
-            self.unknown.size(), self.every);
+            self.unknown.size(), self.every, self.frames);
       });
   py::enum_<TruthKind>(module, "TruthKind", "What a file says places are the same by.")
       .value("runs", TruthKind::runs, "rows of query,first,last or query,match")
@@ -183,10 +188,9 @@ void bind_poses(py::module_& module) {
         return to_array(read_without_gil(path.string(), times_s, every));
       },
       py::arg("path"), py::arg("times_s"), py::arg("every") = 1,
-      "Camera centres by KITTI poses or a TUM trajectory, shape (n, 3), nan where not known: one "
-      "for each time, None where a frame has none. Of the sequence's frames every so-many-th was "
-      "read, "
-      "at these times.");
+      "Camera centres by KITTI poses, a TUM trajectory or EuRoC states, shape (n, 3), nan where "
+      "not known: one for each time, None where a frame has none. Of the sequence's frames every "
+      "so-many-th was read, at these times.");
   module.def(
       "_check_poses",
       [](const Path& path, std::optional<std::size_t> frames, int every) {

@@ -23,15 +23,26 @@ bool is_folder(const std::string& path) {
   return fs::is_directory(path, error);
 }
 
+/// The folder of a run of which `path` is the list, or `path`.
+std::string run_of(const std::string& path) {
+  const fs::path list(path);
+  const fs::path folder = list.has_parent_path() ? list.parent_path() : ".";
+  std::error_code error;
+  const bool is_of_run =
+      list.filename() == "loops.csv" && fs::is_regular_file(folder / "run.json", error);
+  return is_of_run ? folder.string() : path;
+}
+
 std::pair<std::string, std::string> name_and_path(const std::string& text) {
   const auto equals = text.find('=');
   std::error_code error;
   if (equals != std::string::npos && !fs::exists(text, error)) {
-    return {text.substr(0, equals), text.substr(equals + 1)};
+    return {text.substr(0, equals), run_of(text.substr(equals + 1))};
   }
-  const fs::path path = fs::path(text).lexically_normal();
+  const std::string run = run_of(text);
+  const fs::path path = fs::path(run).lexically_normal();
   const fs::path last = path.has_filename() ? path : path.parent_path();
-  return {is_folder(text) ? last.filename().string() : last.stem().string(), text};
+  return {is_folder(run) ? last.filename().string() : last.stem().string(), run};
 }
 
 using Json = nlohmann::ordered_json;

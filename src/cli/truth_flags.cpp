@@ -32,8 +32,8 @@ void TruthFlags::add_to(CLI::App& command) {
   CLI::Option* option_truth =
       command
           .add_option("--truth", truth,
-                      "What is true: CSV of query,first,last or query,match; KITTI poses or a TUM "
-                      "trajectory; a loop matrix as .mat, text or image")
+                      "What is true: CSV of query,first,last or query,match; KITTI poses, a TUM "
+                      "trajectory or EuRoC states; a loop matrix as .mat, text or image")
           ->type_name("FILE");
   command
       .add_option("--not-false", not_false,
@@ -71,7 +71,9 @@ void TruthFlags::add_to(CLI::App& command) {
 }
 
 void TruthFlags::add_poses_to(CLI::App& command) {
-  command.add_option("--poses", poses, "KITTI poses or a TUM trajectory, for the report's map")
+  command
+      .add_option("--poses", poses,
+                  "KITTI poses, a TUM trajectory or EuRoC states, for the report's map")
       ->type_name("FILE");
 }
 

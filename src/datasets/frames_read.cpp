@@ -8,6 +8,17 @@
 
 namespace loopbit::datasets {
 
+void check_pose_each(const std::string& path, std::size_t poses, std::size_t frames_read,
+                     int every) {
+  const auto step = static_cast<std::size_t>(every);
+  if ((poses + step - 1) / step == frames_read) return;
+  throw Error(ErrorKind::input,
+              fmt::format("'{}' tells {} poses by time, but the {} frames read have no times to "
+                          "tell which belong together: give the folder or list of the sequence "
+                          "that has its times, or one pose a frame.",
+                          path, poses, frames_read));
+}
+
 void check_rows(const std::string& path, std::size_t rows, const char* things,
                 std::size_t frames_read, int every) {
   if (frames_read == 0) return;

@@ -30,6 +30,10 @@ std::optional<PlaceRun> parse_run(const std::vector<std::string_view>& cells) {
   return PlaceRun{*query, *first, *last};
 }
 
+[[noreturn]] void throw_bad_names(const std::string& path, const datasets::TextRow& row) {
+  datasets::throw_bad_row(path, row, "the names query,first,last or query,match in order");
+}
+
 /// Throws Error where a name stands in another's place.
 void check_names(const std::string& path, const datasets::TextRow& row,
                  const std::vector<std::string_view>& names) {
@@ -37,11 +41,11 @@ void check_names(const std::string& path, const datasets::TextRow& row,
       {{"query", 0}, {"frame", 0}, {"match", 1}, {"first", 1}, {"last", 2}}};
   for (std::size_t i = 0; i < names.size(); ++i) {
     for (const auto& [name, column] : kKnown) {
-      if (names[i] == name && i != column) {
-        datasets::throw_bad_row(path, row, "the names query,first,last or query,match in order");
-      }
+      if (names[i] == name && i != column) throw_bad_names(path, row);
     }
   }
+  // Of what has been found, the third column is a score.
+  if (names.size() == 3 && (names[1] == "match" || names[2] == "score")) throw_bad_names(path, row);
 }
 
 std::vector<int> thinned(const std::vector<int>& frames, int every) {
@@ -110,7 +114,8 @@ GroundTruth every_nth(const GroundTruth& truth, int every) {
   return {.same_place = thinned(truth.same_place, every),
           .near_place = thinned(truth.near_place, every),
           .ignored = thinned(truth.ignored, every),
-          .unknown = thinned(truth.unknown, every)};
+          .unknown = thinned(truth.unknown, every),
+          .frames = (truth.frames + every - 1) / every};
 }
 
 void write_place_runs(const std::string& path, const std::string& comment,

@@ -14,18 +14,20 @@
 
 #include "cells.hpp"
 #include "frames_read.hpp"
+#include "pose_columns.hpp"
 #include "text_rows.hpp"
 
 namespace loopbit {
 namespace {
 
-constexpr std::size_t kKittiColumns = 12;
-constexpr std::size_t kTumColumns = 8;
+using datasets::kEurocColumns;
+using datasets::kKittiColumns;
+using datasets::kTumColumns;
 
 /// Files are rounded; what is further than this from a rotation is something else.
 constexpr double kMaxRotationError = 0.01;
 
-using Numbers = std::array<double, kKittiColumns>;
+using Numbers = std::array<double, kEurocColumns>;
 
 bool parse_numbers(const std::vector<std::string_view>& cells, Numbers& numbers) {
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -47,20 +49,50 @@ std::optional<CameraPose> kitti_pose(const Numbers& n) {
   return CameraPose{{}, {n[3], n[7], n[11]}, cv::normalize(ahead)};
 }
 
-std::optional<CameraPose> tum_pose(const Numbers& n) {
-  cv::Vec4d q(n[4], n[5], n[6], n[7]);
+std::optional<CameraPose> timed_pose(double time_s, const cv::Vec3d& position_m, cv::Vec4d q) {
   const double length = cv::norm(q);
   if (!(std::abs(length - 1.0) <= kMaxRotationError)) return std::nullopt;
   q /= length;
   const auto [x, y, z, w] = std::array{q[0], q[1], q[2], q[3]};
   const cv::Vec3d ahead(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y));
-  return CameraPose{n[0], {n[1], n[2], n[3]}, cv::normalize(ahead)};
+  return CameraPose{time_s, position_m, cv::normalize(ahead)};
+}
+
+std::optional<CameraPose> tum_pose(const Numbers& n) {
+  return timed_pose(n[0], {n[1], n[2], n[3]}, {n[4], n[5], n[6], n[7]});
+}
+
+/// Of the body, whose z axis is that of cam0 to 2 degrees.
+std::optional<CameraPose> euroc_pose(const Numbers& n) {
+  constexpr double kNanosecondsPerSecond = 1e9;
+  return timed_pose(n[0] / kNanosecondsPerSecond, {n[1], n[2], n[3]}, {n[5], n[6], n[7], n[4]});
 }
 
 std::optional<CameraPose> parse_pose(const std::vector<std::string_view>& cells) {
   Numbers numbers{};
   if (cells.size() > numbers.size() || !parse_numbers(cells, numbers)) return std::nullopt;
-  return cells.size() == kTumColumns ? tum_pose(numbers) : kitti_pose(numbers);
+  switch (cells.size()) {
+    case kTumColumns:
+      return tum_pose(numbers);
+    case kKittiColumns:
+      return kitti_pose(numbers);
+    case kEurocColumns:
+      return euroc_pose(numbers);
+    default:
+      return std::nullopt;
+  }
+}
+
+const char* expected_pose(std::size_t columns) {
+  switch (columns) {
+    case kTumColumns:
+      return "a TUM pose: time, position and unit quaternion x y z w";
+    case kEurocColumns:
+      return "a EuRoC state: time in ns, position, unit quaternion w x y z, and 9 numbers more";
+    default:
+      return "a KITTI pose (12 numbers: 3 x 4, of a rotation and a position), a TUM pose (8 "
+             "numbers) or a EuRoC state (17)";
+  }
 }
 
 struct TimedPose {
@@ -116,6 +148,7 @@ std::vector<std::optional<cv::Vec3d>> positions_by_row(const std::string& path,
                                                        const std::vector<CameraPose>& poses,
                                                        std::size_t frames, int every) {
   check_every(every);
+  if (have_times(poses)) datasets::check_pose_each(path, poses.size(), frames, every);
   datasets::check_rows(path, poses.size(), "poses", frames, every);
   const auto step = static_cast<std::size_t>(every);
   std::vector<std::optional<cv::Vec3d>> positions_m;
@@ -132,15 +165,9 @@ std::vector<CameraPose> read_poses(const std::string& path) {
   std::size_t columns = 0;
   for (const auto& row : datasets::read_rows(path)) {
     datasets::split_cells(row.text, cells);
-    if (columns == 0) columns = cells.size() == kTumColumns ? kTumColumns : kKittiColumns;
+    if (columns == 0) columns = cells.size();
     const auto pose = cells.size() == columns ? parse_pose(cells) : std::nullopt;
-    if (!pose) {
-      datasets::throw_bad_row(path, row,
-                              columns == kTumColumns
-                                  ? "a TUM pose: time, position and unit quaternion x y z w"
-                                  : "a KITTI pose (12 numbers: 3 x 4, of a rotation and a "
-                                    "position) or a TUM pose (8 numbers)");
-    }
+    if (!pose) datasets::throw_bad_row(path, row, expected_pose(columns));
     poses.push_back(*pose);
   }
   if (poses.empty()) {

@@ -15,6 +15,7 @@
 #include "frames_read.hpp"
 #include "image_file.hpp"
 #include "mat_file.hpp"
+#include "pose_columns.hpp"
 #include "text_rows.hpp"
 #include "truth_matrix.hpp"
 
@@ -105,8 +106,17 @@ int every_of_matrix(const TruthOptions& options) {
 GroundTruth truth_of(const TruthMatrix& matrix, const std::string& path,
                      const TruthOptions& options, const Times& times_s) {
   const int every = every_of_matrix(options);
-  datasets::check_rows(path, matrix.frames(), "frames", times_s.size(), every);
-  return {.same_place = matrix.runs(), .every = every};
+  const auto frames_read = times_s.size();
+  const auto views = static_cast<std::size_t>(options.views);
+  if (every < options.views && frames_read > matrix.frames() &&
+      frames_read <= matrix.frames() * views) {
+    throw Error(ErrorKind::input,
+                fmt::format("'{}' has {} frames of {} rows each, and {} images were read: where "
+                            "these are its views in turn, read every {}-th.",
+                            path, matrix.frames(), views, frames_read, views));
+  }
+  datasets::check_rows(path, matrix.frames(), "frames", frames_read, every);
+  return {.same_place = matrix.runs(), .every = every, .frames = static_cast<int>(matrix.frames())};
 }
 
 /// In the numbers of the whole sequence what is in those of the frames read.
@@ -142,9 +152,11 @@ GroundTruth read_pose_truth(const std::string& path, const TruthOptions& options
   if (poses_timed && std::ranges::any_of(times_s, has_time)) {
     return truth_by_time(poses, options, times_s);
   }
+  if (poses_timed) datasets::check_pose_each(path, poses.size(), times_s.size(), options.every);
   datasets::check_rows(path, poses.size(), "poses", times_s.size(), options.every);
   GroundTruth truth = truth_from_poses({poses.begin(), poses.end()}, options.poses);
   truth.every = options.every;
+  truth.frames = static_cast<int>(poses.size());
   return truth;
 }
 
@@ -154,11 +166,18 @@ TruthKind text_kind(const std::string& path, const std::vector<TextRow>& rows) {
   std::vector<std::string_view> cells;
   datasets::split_cells(rows.front().text, cells);
   if (cells.size() == 2 || cells.size() == 3) return TruthKind::runs;
-  if (cells.size() == 8 || cells.size() == 12) return TruthKind::poses;
-  if (cells.size() >= kFewestMatrixColumns) return TruthKind::matrix;
-  datasets::throw_bad_row(path, rows.front(),
-                          "query,first,last, or query,match, or a pose of 12 (KITTI) or 8 (TUM) "
-                          "numbers, or one of at least 13 rows of a square matrix");
+  const bool is_square = cells.size() == rows.size();
+  if (cells.size() == datasets::kTumColumns || cells.size() == datasets::kKittiColumns ||
+      (cells.size() == datasets::kEurocColumns && !is_square)) {
+    return TruthKind::poses;
+  }
+  if (cells.size() >= kFewestMatrixColumns && is_square) return TruthKind::matrix;
+  datasets::throw_bad_row(
+      path, rows.front(),
+      fmt::format("query,first,last, or query,match, or a pose of 12 (KITTI), 8 (TUM) or 17 "
+                  "(EuRoC) numbers, or {} numbers, as many as the file has rows (at least 13): a "
+                  "square matrix",
+                  rows.size()));
 }
 
 bool is_mat_file(const std::string& path) { return datasets::lower_extension(path) == ".mat"; }

@@ -10,6 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -54,6 +58,7 @@ class Scorer {
         judge_(truth, options),
         elsewhere_(list.elsewhere.begin(), list.elsewhere.end()) {
     result_.options = options;
+    check_frames(truth);
     for (const PlaceRun& run : truth.same_place) {
       const int query = run.query / truth.every;
       if (run.query % truth.every != 0 || !is_scored(query)) continue;
@@ -74,6 +79,18 @@ class Scorer {
   }
 
  private:
+  /// Throws where the list goes beyond the frames of which is known what is true.
+  void check_frames(const GroundTruth& truth) const {
+    if (truth.frames <= 0) return;
+    for (const ReportedMatch& match : list_.matches) {
+      if (std::int64_t{match.query} * truth.every < truth.frames) continue;
+      throw Error(ErrorKind::input,
+                  fmt::format("Query {} is beyond the {} frames that ground truth tells of: give "
+                              "that of this sequence, and which of its frames were read.",
+                              match.query, truth.frames));
+    }
+  }
+
   [[nodiscard]] bool is_past_end(int query) const {
     return !list_.times_s.empty() && static_cast<std::size_t>(query) >= list_.times_s.size();
   }

@@ -29,12 +29,13 @@ std::span<const Protocol> protocols() {
                TruthKind::matrix,
                {},
                0},
-      Protocol{"fab-map",
-               "loop mask with left and right images in turn: a frame is a pair of images (Cummins "
-               "and Newman 2008)",
-               TruthKind::matrix,
-               {.poses = {}, .variable = "", .views = 2},
-               0},
+      Protocol{
+          "fab-map",
+          "loop mask with left and right images in turn: a frame is a pair of images, of which "
+          "--every 2 reads the left (Cummins and Newman 2008)",
+          TruthKind::matrix,
+          {.poses = {}, .variable = "", .views = 2},
+          0},
   };
   return kProtocols;
 }

@@ -25,6 +25,7 @@ struct GroundTruth {
   std::vector<int> unknown = {};
   /// Of the sequence's frames every so-many-th was read: the k-th of them is frame k * every here.
   int every = 1;
+  int frames = 0;  ///< how many frames of the sequence are told of; 0 = not known
 };
 
 /// Reads rows of `query,first,last` or, all of them, `query,match` (spaces do for commas, too) with

@@ -23,9 +23,11 @@ struct CameraPose {
   cv::Vec3d ahead;  ///< the viewing direction (the camera's z axis), unit length
 };
 
-/// Reads poses, one a row: KITTI's (12 numbers: camera to world, 3 x 4) or a TUM trajectory's (8
-/// numbers: time, position, quaternion x y z w); rows of one kind, numbers separated by spaces or
-/// commas, `#` begins a comment. Throws Error (kind input) that names file and line.
+/// Reads poses, one a row: KITTI's (12 numbers: camera to world, 3 x 4), a TUM trajectory's (8
+/// numbers: time, position, quaternion x y z w) or EuRoC's states (17: time in ns, position,
+/// quaternion w x y z, 9 that are not read; of the body, not of the camera); rows of one kind,
+/// numbers separated by spaces or commas, `#` begins a comment. Throws Error (kind input) that
+/// names file and line.
 std::vector<CameraPose> read_poses(const std::string& path);
 
 /// The pose of each frame, none where it is not known: the nearest in time (at most

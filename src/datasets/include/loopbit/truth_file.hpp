@@ -33,7 +33,7 @@ struct TruthOptions {
 ///  - a .mat file of MATLAB 5 to 7.3: a square matrix, dense (at most 1 GiB) or sparse, of any
 ///    numeric or logical class;
 ///  - an image: a square mask, true where it is not black, and no JPEG, whose black is not;
-///  - text of 12 or 8 numbers a row: poses, see poses.hpp;
+///  - text of 12, 8 or 17 numbers a row: poses, see poses.hpp;
 ///  - text of `query,first,last` or `query,match` rows, see ground_truth.hpp;
 ///  - text of as many numbers a row as rows (at least 13): a square matrix.
 /// In a matrix, row and column are frames and any entry but 0 is true, above or below the diagonal:
@@ -47,8 +47,8 @@ struct TruthOptions {
 ///
 /// `times_s`: the times of the frames read, one a frame, where they are known (0 frames = not
 /// known). A trajectory goes by time where any frame has one, and by number, a row a frame of the
-/// whole sequence, where they are known to have none. Rows may be more than frames, of a run that
-/// ended early, never fewer.
+/// whole sequence, where they are known to have none: then the trajectory must have one for each
+/// frame. Other rows may be more than frames, of a run that ended early, never fewer.
 /// Throws Error (kind input) that names file, fault and remedy. A 4541 x 4541 matrix takes well
 /// under a second.
 GroundTruth read_truth(const std::string& path, const TruthOptions& options = {},
