@@ -20,5 +20,5 @@ echo '#define ROBOT 1' >"$scratch/project/forced.hpp"
 cmake -S "$scratch/project" -B "$scratch/build" -G Ninja --log-level=WARNING \
   -DBUILD_SHARED_LIBS=ON -DLOOPBIT_BUILD_CLI=ON -DCMAKE_INSTALL_PREFIX="$scratch/prefix"
 cmake --build "$scratch/build" --target loopbit_base
-grep -qF 'NEW_RPATH "\$ORIGIN/../lib"' "$scratch/build/loopbit/src/cli/cmake_install.cmake"
+grep -qF "NEW_RPATH \"\\\$ORIGIN/../lib\"" "$scratch/build/loopbit/src/cli/cmake_install.cmake"
 echo "a part of another project is built, and its command finds the libraries installed with it"
