@@ -75,6 +75,15 @@ class MapCommandTest(CommandTest):
         self.assert_fails(ran, 2, self.map, "surf.max_keypoints", "600", "100")
         self.assertFalse(self.out.exists())
 
+    def test_a_refused_run_leaves_the_map_as_it_is(self):
+        copy = self.copy_of_map()
+        before = copy.read_bytes()
+        ran = loopbit("run", self.laps[0], "--map", copy, "--out", self.out, "--set",
+                      "surf.max_keypoints=100")
+        self.assert_fails(ran, 2, copy, "surf.max_keypoints")
+        self.assertEqual(copy.read_bytes(), before)
+        self.assertEqual(list(self.scratch.iterdir()), [copy])
+
     def test_a_second_writer_is_refused_and_readers_are_not(self):
         copy = self.copy_of_map()
         holder = subprocess.Popen(

@@ -141,6 +141,7 @@ TEST_F(MapDamage, AMapWithoutItsFirstPageIsRecovered) {
   EXPECT_EQ(check.loops, 1);
   EXPECT_EQ(check.damage.size(), 1U);
   EXPECT_FALSE(fs::exists(path("recovered.db.part")));
+  EXPECT_FALSE(fs::exists(path("recovered.db.part.repaired")));
   MapReader recovered(path("recovered.db"));
   expect_only_true_places(recovered);
 }
@@ -210,6 +211,26 @@ TEST_F(MapDamage, ARecoveryThatFindsNoSpaceLeavesNothing) {
   }
   EXPECT_FALSE(fs::exists(path("new.db")));
   EXPECT_EQ(recover_map(path("map.db"), path("new.db")).places, kFrames);
+}
+
+TEST_F(MapDamage, WhatARecoveryLeftBehindDoesNotStopTheNext) {
+  // The log of a map that was removed, and what a kill leaves.
+  {
+    MapWriter map(path("removed.db"), fast_options(), "drive");
+    add_frame(map, 0);
+    map.flush();
+    fs::copy_file(path("removed.db-wal"), path("new.db-wal"));
+    fs::copy_file(path("removed.db-shm"), path("new.db-shm"));
+  }
+  for (const char* left : {"new.db.part", "new.db.part-wal", "new.db.part-journal",
+                           "new.db-journal", "new.db.part.repaired"}) {
+    (void)write(left, std::string(100'000, 'x'));
+  }
+  EXPECT_EQ(recover_map(path("map.db"), path("new.db")).places, kFrames);
+  EXPECT_EQ(places_of(path("new.db")).size(), std::size_t{kFrames});
+  EXPECT_TRUE(check_map(path("new.db")).damage.empty());
+  EXPECT_FALSE(fs::exists(path("new.db-wal")));
+  EXPECT_FALSE(fs::exists(path("new.db.part")));
 }
 
 TEST_F(MapDamage, AMapThatCannotBeMadeIsNamed) {

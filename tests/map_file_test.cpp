@@ -116,6 +116,37 @@ TEST_F(MapFile, SavedFramesAreSeenByReadersBesideTheWriter) {
   EXPECT_EQ(places_of(reader).size(), 100U);
 }
 
+TEST_F(MapFile, AFinishedSessionIsInTheFileAloneAlsoBesideAnIdleReader) {
+  MapWriter map(map_path_, fast_options(), "drive");
+  for (int frame = 0; frame < 5; ++frame) add_frame(map, frame);
+  map.flush();
+  MapReader reader(map_path_);
+  for (int frame = 5; frame < 60; ++frame) add_frame(map, frame);
+  map.finish();
+  fs::copy_file(map_path_, path("copy.db"));
+  EXPECT_EQ(places_of(path("copy.db")).size(), 60U);
+  EXPECT_EQ(places_of(reader).size(), 60U);
+}
+
+TEST_F(MapFile, ZeroIsZeroWhateverItsSign) {
+  {
+    MapWriter map(map_path_, fast_options(), "drive");
+    map.add({.frame = 0,
+             .timestamp_s = -0.0,
+             .status = Status::loop,
+             .earlier_match = SessionFrame{1, 0},
+             .score = -0.0,
+             .similarity = -0.0},
+            content_of(0), std::make_shared<const Features>(few_features(0)), cv::Mat());
+  }
+  MapReader map(map_path_);
+  ASSERT_EQ(places_of(map).size(), 1U);
+  EXPECT_EQ(places_of(map)[0].timestamp_s, 0.0);
+  EXPECT_EQ(map.loops().size(), 1U);
+  EXPECT_EQ(map.damage(), std::vector<std::string>{});
+  EXPECT_EQ(recover_map(map_path_, path("new.db")).places, 1);
+}
+
 TEST_F(MapFile, DescriptorsThatNoKernelTakesAreLost) {
   Features features = few_features(0);
   features.descriptors[1][5] = -128;
@@ -179,6 +210,17 @@ TEST_F(MapFile, AMapMadeWithOtherSettingsIsRefused) {
   expect_error(ErrorKind::option,
                {map_path_, "surf.max_keypoints = 300", "has 200", "--set surf.max_keypoints=300"},
                [&] { const MapWriter map(map_path_, options, "drive"); });
+}
+
+TEST_F(MapFile, ARefusedSessionLeavesTheMapAsItIs) {
+  add_session(map_path_, 3);
+  const std::string before = read_bytes(map_path_);
+  LoopDetectorOptions options = fast_options();
+  options.surf.max_keypoints = 200;
+  expect_error(ErrorKind::option, {map_path_},
+               [&] { const MapWriter map(map_path_, options, "drive"); });
+  EXPECT_EQ(read_bytes(map_path_), before);
+  EXPECT_TRUE(is_one_file(map_path_));
 }
 
 TEST_F(MapFile, OtherFilesAreRefused) {

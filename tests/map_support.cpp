@@ -3,6 +3,7 @@
 #include "map_support.hpp"
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -114,6 +115,12 @@ void expect_only_true_places(MapReader& map) {
 std::string read_bytes(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), {}};
+}
+
+bool is_one_file(const std::string& path) {
+  // sqlite.org/fileformat2.html, 1.3.3: bytes 18 and 19 are 2 where there is a log.
+  return read_bytes(path).substr(18, 2) == "\1\1" && !std::filesystem::exists(path + "-wal") &&
+         !std::filesystem::exists(path + "-shm");
 }
 
 void change(const std::string& path, const std::string& sql) {

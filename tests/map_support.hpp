@@ -49,6 +49,10 @@ void expect_only_true_places(MapReader& map);
 
 std::string read_bytes(const std::string& path);
 
+/// Whether the map is in the file alone, which can be read without the right to write: it has no
+/// log, and its header asks for none.
+bool is_one_file(const std::string& path);
+
 /// Changes a SQLite file, made if there is none, as no map of ours is changed.
 void change(const std::string& path, const std::string& sql);
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -89,6 +90,50 @@ TEST_F(MapTools, OfADamagedMapNothingIsMerged) {
                [&] { merge_map(path("a.db"), path("b.db")); });
   EXPECT_EQ(MapReader(path("a.db")).sessions().size(), 1U);
   EXPECT_EQ(places_of(path("a.db")).size(), 3U);
+}
+
+TEST_F(MapTools, AMapMergedIntoItselfStaysAsItIs) {
+  add_session(path("a.db"), 3, "first");
+  add_session(path("a.db"), 3, "second");
+  fs::create_symlink("a.db", path("link.db"));
+  const MergeCounts counts = merge_map(path("a.db"), path("link.db"));
+  EXPECT_EQ(counts.known, 2);
+  EXPECT_EQ(counts.sessions + counts.places + counts.loops, 0);
+  EXPECT_EQ(places_of(path("a.db")).size(), 6U);
+  EXPECT_TRUE(is_one_file(path("a.db")));
+}
+
+TEST_F(MapTools, ARefusedMergeLeavesNoLog) {
+  add_session(path("a.db"), 3);
+  add_session(path("damaged.db"), 3);
+  change(path("damaged.db"), "UPDATE place SET frame = 9 WHERE place = 2");
+  expect_error(ErrorKind::input, {path("damaged.db")},
+               [&] { merge_map(path("a.db"), path("damaged.db")); });
+  EXPECT_TRUE(is_one_file(path("a.db")));
+  LoopDetectorOptions options = fast_options();
+  options.surf.max_keypoints = 200;
+  {
+    MapWriter map(path("other.db"), options, "drive");
+    add_frame(map, 0);
+  }
+  expect_error(ErrorKind::option, {path("a.db")},
+               [&] { merge_map(path("a.db"), path("other.db")); });
+  EXPECT_TRUE(is_one_file(path("a.db")));
+}
+
+TEST_F(MapTools, WhatIsMergedIsInTheFileAloneAlsoBesideAnIdleReader) {
+  add_session(path("b.db"), 40);
+  std::unique_ptr<MapReader> reader;
+  {
+    MapWriter map(path("a.db"), fast_options(), "drive");
+    add_frame(map, 0);
+    map.flush();
+    reader = std::make_unique<MapReader>(path("a.db"));
+  }
+  merge_map(path("a.db"), path("b.db"));
+  fs::copy_file(path("a.db"), path("copy.db"));
+  EXPECT_EQ(places_of(path("copy.db")).size(), 41U);
+  EXPECT_EQ(places_of(*reader).size(), 41U);
 }
 
 TEST_F(MapTools, IntoAMapWithALostSessionNothingIsMerged) {

@@ -137,7 +137,7 @@ MapCheck recover_to_new(const std::string& from, const std::string& to) {
     MapReader source(from);
     return copy_to_new(source, to);
   }
-  const RepairedCopy copy(to + ".part");
+  const RepairedCopy copy(to + ".repaired");
   copy.make(from, kMapVersion);
   // Another page is where images begin, or there are none.
   if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
@@ -188,15 +188,23 @@ MapCheck recover_map(const std::string& from, const std::string& to) {
   if (fs::exists(to, error)) {
     throw Error(ErrorKind::output, fmt::format("'{}' exists; name a new file to recover to.", to));
   }
+  // Under its name there is only a whole one, whenever this is killed.
+  const std::string part = to + ".part";
+  remove_database(part);
+  remove_database(to);  // a log of a map that was there
   try {
-    MapCheck check = recover_to_new(from, to);
-    if (check.sessions > 0 || check.damage.empty()) return check;
+    MapCheck check = recover_to_new(from, part);
+    if (check.sessions > 0 || check.damage.empty()) {
+      fs::rename(part, to, error);
+      if (error) throw cannot_write(to, error.value());
+      return check;
+    }
     throw Error(ErrorKind::input, fmt::format("Nothing of '{}' can be recovered: it is no map of "
                                               "loopbit's, or no session in it is whole; use a "
                                               "copy from before.",
                                               from));
   } catch (const Error&) {
-    remove_database(to);
+    remove_database(part);
     throw;
   }
 }

@@ -3,6 +3,7 @@
 #include "loopbit/map_file.hpp"
 
 #include <ctime>
+#include <filesystem>
 #include <random>
 #include <utility>
 
@@ -204,12 +205,10 @@ class MapWriter::Impl {
 
  private:
   std::unique_ptr<BatchWriter> begin_session(const std::string& name, EncodeImage encode_image) {
+    check_map_is_of_this_shape();
     Database database = open_map_for_writing(path_);
     database_.emplace(open_map_for_reading(path_));
     stored_.emplace(*database_);
-    for (const MapSession& session : read_sessions(*database_, damage_)) {
-      check_same_shape(path_, session.options, options_);
-    }
     session_ = next_session(database);
     first_place_ = next_place(database);
     MapSession session{.session = session_,
@@ -220,6 +219,22 @@ class MapWriter::Impl {
                        .options = to_json(options_)};
     return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_,
                                          std::move(encode_image));
+  }
+
+  /// Throws Error (kind option) if the map, where there is one, has places of other settings:
+  /// before it is opened for writing, which changes the file. Why it cannot be read, opening tells
+  /// then.
+  void check_map_is_of_this_shape() {
+    std::error_code error;
+    const auto bytes = std::filesystem::file_size(path_, error);
+    if (error || bytes == 0) return;
+    std::vector<MapSession> sessions;
+    try {
+      sessions = read_sessions(open_map_for_reading(path_), damage_);
+    } catch (const Error&) {
+      return;
+    }
+    for (const MapSession& session : sessions) check_same_shape(path_, session.options, options_);
   }
 
   /// Throws Error (kind option) after finish().

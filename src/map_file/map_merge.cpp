@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <vector>
@@ -60,13 +61,16 @@ void refuse_unfinished(const std::string& from) {
                                             from));
 }
 
-}  // namespace
+/// Leaves the transaction, if it is not left already.
+void undo(const Database& database) {
+  try {
+    database.execute("ROLLBACK");
+  } catch (const Error&) {
+  }
+}
 
-MergeCounts merge_map(const std::string& into, const std::string& from) {
-  MapReader source(from);
-  refuse_unfinished(from);
-  const WriterLock lock(into);
-  const Database to = open_map_for_writing(into);
+/// Adds what `into` does not have of `source`, in one transaction.
+MergeCounts merge(const std::string& into, const Database& to, MapReader& source) {
   const MergePlan plan = plan_of(into, to, source);
   std::set<int> added;
   for (const MapSession& session : plan.added) added.insert(session.session);
@@ -75,22 +79,45 @@ MergeCounts merge_map(const std::string& into, const std::string& from) {
   MapCopy copy(to, plan.numbers);
   std::int64_t id = next_place(to);
   to.execute("BEGIN IMMEDIATE");
-  for (const MapSession& session : plan.added) copy.copy_session(session);
-  source.for_each_place([&](const MapPlace& place) {
-    if (!added.contains(place.at.session)) return;
-    const auto features = source.features_of(place);
-    if (!features) return;
-    MapPlace copied = place;
-    copied.id = id++;
-    counts.places += copy.copy_place(copied, *features, source.image_of(place));
-  });
-  for (const MapLoop& loop : source.loops()) {
-    if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
+  try {
+    for (const MapSession& session : plan.added) copy.copy_session(session);
+    source.for_each_place([&](const MapPlace& place) {
+      if (!added.contains(place.at.session)) return;
+      const auto features = source.features_of(place);
+      if (!features) return;
+      MapPlace copied = place;
+      copied.id = id++;
+      counts.places += copy.copy_place(copied, *features, source.image_of(place));
+    });
+    for (const MapLoop& loop : source.loops()) {
+      if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
+    }
+    refuse_damaged(source.path(), source.damage());
+    to.execute("COMMIT");
+  } catch (const Error&) {
+    undo(to);
+    throw;
   }
-  refuse_damaged(source.path(), source.damage());  // leaves the transaction
-  to.execute("COMMIT");
-  close_log(to);
   return counts;
+}
+
+}  // namespace
+
+MergeCounts merge_map(const std::string& into, const std::string& from) {
+  auto source = std::make_unique<MapReader>(from);
+  refuse_unfinished(from);
+  const WriterLock lock(into);
+  const Database to = open_map_for_writing(into);
+  try {
+    const MergeCounts counts = merge(into, to, *source);
+    source.reset();  // it may read the same map
+    close_log(to);
+    return counts;
+  } catch (const Error&) {
+    source.reset();
+    close_log(to);
+    throw;
+  }
 }
 
 }  // namespace loopbit

@@ -64,7 +64,8 @@ Checksum& Checksum::add(std::int64_t value) {
 }
 
 Checksum& Checksum::add(double value) {
-  return add(std::bit_cast<std::array<unsigned char, sizeof value>>(value));
+  const double stored = value + 0.0;  // SQLite keeps -0.0 as 0.0
+  return add(std::bit_cast<std::array<unsigned char, sizeof stored>>(stored));
 }
 
 std::span<const unsigned char> content_bytes(const BinaryContent& content) {

@@ -128,8 +128,12 @@ def test_similarity_matrix(images, tolerance):
     assert np.array_equal(loopbit.similarity_matrix(contents, places, tolerance), expected)
     assert loopbit.similarity_matrix(contents).shape == (13, 13)
     assert loopbit.similarity_matrix([], places).shape == (0, 7)
-    with pytest.raises(ValueError, match="shift_tolerance_columns is -1"):
-        loopbit.similarity_matrix(contents, shift_tolerance_columns=-1)
+    for bad in (-1, 64):
+        words = f"shift_tolerance_columns is {bad}, but must be between 0 and 63"
+        with pytest.raises(loopbit.OptionError, match=words):
+            loopbit.similarity_matrix(contents, shift_tolerance_columns=bad)
+        with pytest.raises(loopbit.OptionError, match=words):
+            loopbit.similarity(contents[0], contents[0], bad)
 
 
 def test_features(images):

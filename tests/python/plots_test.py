@@ -91,6 +91,19 @@ def test_times_add_up(run):
     assert plots.times([]).get_xlabel() == "frame"
 
 
+def test_times_are_those_of_readable_frames(images):
+    detector = loopbit.LoopDetector()
+    found = [detector.skip() if number in (0, 2, 3) else detector.process(images[number])
+             for number in range(6)]
+    vertices = plots.times(found).collections[-1].get_paths()[0].vertices
+    readable = loopbit.detections_array([found[number] for number in (1, 4, 5)])
+    total = sum(readable[name] for name in plots._STEPS)
+    assert [vertices[vertices[:, 0] == frame, 1].max() for frame in (1, 4, 5)] == (
+        pytest.approx(total))
+    assert set(vertices[:, 0]) == {1, 4, 5}
+    assert plots.times(found[2:4]).get_ylabel() == "ms a frame"
+
+
 def test_similarity_of_contents(images):
     contents = [loopbit.binary_content(image) for image in images[:3]]
     matrix = loopbit.similarity_matrix(contents)

@@ -222,6 +222,25 @@ def test_bad_arguments_cost_no_run(dataset, tmp_path, arguments, error, words):
     assert sorted(tmp_path.iterdir()) == before
 
 
+@pytest.mark.parametrize("take", [loopbit.ImageSource.skip, next])
+@pytest.mark.parametrize("arguments, words", [
+    ({"truth": "truth.csv"}, "truth is '.*truth.csv'"),
+    ({"truth": "poses.txt"}, "truth is '.*poses.txt'"),
+    ({"positions_m": "poses.txt"}, "positions_m is '.*poses.txt'"),
+])
+def test_files_do_not_count_from_the_middle(dataset, tmp_path, take, arguments, words):
+    source = loopbit.open_source(dataset / "images", limit=13)
+    for _ in range(10):
+        take(source)
+    paths = {name: dataset / file for name, file in arguments.items()}
+    with pytest.raises(loopbit.OptionError, match=f"{words}.* 10 .* were taken.*open it anew"):
+        loopbit.run_folder(source, tmp_path / "run", **paths)
+    assert not any(tmp_path.iterdir())
+    run = loopbit.run_folder(source, tmp_path / "run", truth=loopbit.GroundTruth([[2, 0]]),
+                             positions_m=np.eye(3), evidence=False)
+    assert len(run.detections) == 3 and np.array_equal(run.positions_m, np.eye(3))
+
+
 def test_what_is_wrong_in_the_end_leaves_the_run(world, tmp_path):
     source = loopbit.World(world.options).source()
     with pytest.raises(ValueError, match="7 rows, but there are 120 frames"):

@@ -157,8 +157,8 @@ class MapWriter : public MapStorage {
   /// Commits what was added so far. Throws Error (kind output).
   void flush();
 
-  /// Commits the rest and closes the file, which then is one file without a log beside it, and may
-  /// be written by others. Throws Error (kind output). A detector of this map is of no use
+  /// Commits the rest and closes the file, which then holds all of it and may be written by others.
+  /// There is no log beside it then, unless somebody reads the map. Throws Error (kind output). A detector of this map is of no use
   /// afterwards: what it asks for throws Error (kind option).
   void finish();
 
