@@ -89,6 +89,17 @@ def run(
     return _loopbit._run(source, detector, on_detection, on_bad_frame)
 
 
+def _check_from_start(source: ImageSource, **files: object) -> None:
+    """Raises OptionError for a file, whose first row is the first frame, where that is gone."""
+    taken = _loopbit._frames_taken(source)
+    for name, file in files.items():
+        if taken and isinstance(file, (str, os.PathLike)):
+            raise _loopbit.OptionError(
+                f"{name} is '{os.fspath(file)!s}', which counts from the first frame, but {taken} "
+                "frames of the source were taken before; open it anew."
+            )
+
+
 def run_folder(
     source: ImageSource | Path,
     out: Path | None = None,
@@ -120,6 +131,7 @@ def run_folder(
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)
     every, frames = source.every, _loopbit._frames_left(source)
+    _check_from_start(source, truth=truth, positions_m=positions_m)
     if keep_images and not map:
         raise _loopbit.OptionError("keep_images keeps them in a map; give map, or leave it out.")
     if not callable(on_bad_frame):

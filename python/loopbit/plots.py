@@ -19,7 +19,7 @@ from matplotlib.axes import Axes  # type: ignore[import]
 
 from loopbit import _loopbit
 from loopbit._evaluating import evaluate
-from loopbit._loopbit import BinaryContent, Detection, Evaluation, FinishedRun
+from loopbit._loopbit import BinaryContent, Detection, Evaluation, FinishedRun, Status
 from loopbit._running import detections_array
 
 _STEPS = ("content_ms", "retrieval_ms", "features_ms", "verification_ms")
@@ -98,14 +98,15 @@ def precision_recall(
 def times(
     detections: FinishedRun | Sequence[Detection], axes: Axes | None = None, *, bins: int = 100
 ) -> Axes:
-    """Milliseconds a frame by step, stacked; each bin is the mean of equally many frames."""
+    """Milliseconds a frame by step, stacked; each bin is the mean of equally many frames. Those
+    that could not be read took none, and are left out."""
     if isinstance(detections, FinishedRun):
         detections = detections.detections
-    table = detections_array(detections)
+    table = detections_array([d for d in detections if d.status != Status.unreadable])
     axes = _axes(axes)
     parts = numpy.array_split(numpy.arange(len(table)), min(bins, len(table)) or 1)
     parts = [part for part in parts if len(part)]
-    frames = [float(part.mean()) for part in parts]
+    frames = [float(table["frame"][part].mean()) for part in parts]
     layers = [[float(table[step][part].mean()) for part in parts] for step in _STEPS]
     drawn = axes.stackplot(frames, *layers, colors=_GREYS, edgecolor="0.0", linewidth=0.3,
                            labels=[step.removesuffix("_ms") for step in _STEPS])

@@ -77,14 +77,23 @@ void fill_matrix(const Contents& queries, const Contents& places, int shift_tole
   }
 }
 
+void check_tolerance(int shift_tolerance_columns) {
+  if (shift_tolerance_columns >= 0 && shift_tolerance_columns < kContentSide) return;
+  throw Error(ErrorKind::option,
+              fmt::format("shift_tolerance_columns is {}, but must be between 0 and {}.",
+                          shift_tolerance_columns, kContentSide - 1));
+}
+
+double checked_similarity(const BinaryContent& a, const BinaryContent& b,
+                          int shift_tolerance_columns) {
+  check_tolerance(shift_tolerance_columns);
+  return similarity(a, b, shift_tolerance_columns);
+}
+
 py::array_t<double> similarity_matrix(const Contents& queries,
                                       const std::optional<Contents>& places,
                                       int shift_tolerance_columns) {
-  if (shift_tolerance_columns < 0 || shift_tolerance_columns >= kContentSide) {
-    throw Error(ErrorKind::option,
-                fmt::format("shift_tolerance_columns is {}, but must be between 0 and {}.",
-                            shift_tolerance_columns, kContentSide - 1));
-  }
+  check_tolerance(shift_tolerance_columns);
   const Contents& others = places ? *places : queries;
   py::array_t<double> matrix({queries.size(), others.size()});
   double* cells = matrix.mutable_data();
@@ -141,7 +150,7 @@ void bind_comparison(py::module_& module) {
       "M(O): the mean (x, y) of the set pixels, each in [0, 63]; (31.5, 31.5) if none is set.");
   module.def("shift_columns", &shift_columns, py::arg("content"), py::arg("columns"),
              "The content moved so many columns to the right (left if negative).");
-  module.def("similarity", &similarity, py::arg("a"), py::arg("b"),
+  module.def("similarity", &checked_similarity, py::arg("a"), py::arg("b"),
              py::arg("shift_tolerance_columns") = 0,
              "xi(a, b) = |a & b| / max(|a|, |b|), in [0, 1], the largest over shifts of a by even "
              "numbers of columns up to the tolerance, and by it; Wang et al. 2019, section III-B.");

@@ -89,6 +89,7 @@ void bind_source(py::module_& module) {
              "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
              "folder, a text file that lists images, an image, a video, or 'camera:N'. Every so "
              "many-th frame is read, at most so many (0: all).");
+  module.def("_frames_taken", &SharedSource::frames_taken, py::arg("source"), Free());
   module.def("_frames_left", &SharedSource::frames_left, py::arg("source"), Free());
 }
 

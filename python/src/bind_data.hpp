@@ -38,6 +38,10 @@ class SharedSource : public ImageSource {
     check_time(source_.prove(input_), options);
   }
 
+  [[nodiscard]] std::size_t frames_taken() {
+    const std::scoped_lock lock(mutex_);
+    return taken_;
+  }
   /// How many frames are still to come, where that is sure.
   [[nodiscard]] std::optional<std::size_t> frames_left() {
     const std::scoped_lock lock(mutex_);
