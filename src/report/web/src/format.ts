@@ -15,12 +15,17 @@ export const share = (value: number | null): string =>
 
 export const similarity = share;
 
-/** Scores are sums of halves as a rule, but another detector's may be anything. */
+/**
+ * Scores are sums of halves as a rule, but another detector's may be anything: probabilities near 0
+ * and near 1 stay told from these.
+ */
 export function score(value: number | null): string {
   if (value === null) return kMissing;
   if (Number.isInteger(value)) return count(value);
-  const digits = Math.abs(value) >= 100 ? 1 : Math.abs(value) >= 1 ? 2 : 4;
-  return value.toFixed(digits).replace(/\.?0+$/, "");
+  const size = Math.abs(value);
+  if (size >= 1) return value.toFixed(size >= 100 ? 1 : 2).replace(/\.?0+$/, "");
+  const shown = Number(value.toPrecision(4));
+  return String(Number.isInteger(shown) ? value : shown);
 }
 
 /** Three significant digits or so; steps take from microseconds to seconds. */

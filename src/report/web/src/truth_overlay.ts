@@ -46,7 +46,8 @@ export function truthOverlay(
 ): TruthOverlay {
   const mask = maskOf(triples, side, framesPerCell);
   const fill = html("canvas", { width: side, height: side });
-  const ctx = fill.getContext("2d");
+  // Of no frames at all there is nothing to fill.
+  const ctx = side > 0 ? fill.getContext("2d") : null;
   const pixels = ctx?.createImageData(side, side);
   if (ctx && pixels) {
     for (let i = 0; i < mask.length; ++i) {
