@@ -3,10 +3,11 @@
 // The report page in a real browser:
 //
 //   node report_test.mjs [--report FILE [--run-json FILE]]... [--page FILE] [--playwright DIR]
-//                        [--screenshots DIR]
+//                        [--screenshots DIR] [--opens FILE]
 //
 // --report: a page as the command writes it, and the run.json it must agree with.
 // --page: the page before data is put into it; it is tested with made-up data of many kinds.
+// --opens: a page of which only that is asked: that it opens without a fault.
 // --playwright: the node_modules that holds playwright-core. CHROMIUM names the browser.
 import assert from "node:assert/strict";
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
@@ -53,19 +54,25 @@ const kReportsAtOnce = 3;
 const kInFull = ["several revisits", "three runs", "one frame"];
 
 function argumentsOf(words) {
-  const found = { reports: [], page: null, playwright: "node_modules", screenshots: null };
+  const found = {
+    reports: [],
+    page: null,
+    playwright: "node_modules",
+    screenshots: null,
+    opens: null,
+  };
   for (let i = 0; i < words.length; i += 2) {
     const [name, value] = [words[i], words[i + 1]];
     assert.ok(value, `${name} needs a value`);
     if (name === "--report") found.reports.push({ file: value, runJson: null });
     else if (name === "--run-json") found.reports.at(-1).runJson = value;
-    else if (["--page", "--playwright", "--screenshots"].includes(name))
+    else if (["--page", "--playwright", "--screenshots", "--opens"].includes(name))
       found[name.slice(2)] = value;
     else assert.fail(`unknown argument ${name}`);
   }
   assert.ok(
-    found.reports.length > 0 || found.page,
-    "nothing to test: --report FILE or --page FILE",
+    found.reports.length > 0 || found.page || found.opens,
+    "nothing to test: --report, --page or --opens FILE",
   );
   return found;
 }
@@ -184,8 +191,22 @@ async function checkSpeed(browser, template, scratch) {
   }
 }
 
+async function checkOpens(browser, file) {
+  try {
+    const { faults, close } = await open(browser, file);
+    assert.deepEqual(faults, []);
+    await close();
+    console.log(`ok      ${path.basename(file)}: opens`);
+    return [];
+  } catch (error) {
+    console.log(`FAILED  ${path.basename(file)}: opens\n        ${error.message}`);
+    return [`${path.basename(file)}: opens`];
+  }
+}
+
 /** A function for each report, which checks it in a browser. */
-function* checksOfReports({ reports, page, screenshots }, scratch) {
+function* checksOfReports({ reports, page, screenshots, opens }, scratch) {
+  if (opens) yield (browser) => checkOpens(browser, opens);
   for (const { file, runJson } of reports) {
     const record = runJson ? JSON.parse(readFileSync(runJson, "utf8")) : null;
     const name = path.basename(path.dirname(path.resolve(file)));

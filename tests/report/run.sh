@@ -19,7 +19,12 @@ printf 'query,match,score\n120,45,0.9\n121,10,0.7\n' >"$scratch/other.csv"
 "$loopbit" compare "$scratch/demo" "$scratch/strict" "other=$scratch/other.csv" \
   --out "$scratch/compared.html"
 
+printf 'query,match,score\n' >"$scratch/none.csv"
+printf 'query,match\n' >"$scratch/no_revisit.csv"
+"$loopbit" compare "one=$scratch/none.csv" "another=$scratch/none.csv" \
+  --truth "$scratch/no_revisit.csv" --out "$scratch/no_frames.html"
+
 node "$here/report_test.mjs" --playwright "$web/node_modules" --page "$web/dist/report.html" \
   --report "$scratch/demo/report.html" --run-json "$scratch/demo/run.json" \
   --report "$scratch/second/report.html" --run-json "$scratch/second/run.json" \
-  --report "$scratch/compared.html"
+  --report "$scratch/compared.html" --opens "$scratch/no_frames.html"

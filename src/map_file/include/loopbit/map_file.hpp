@@ -158,8 +158,8 @@ class MapWriter : public MapStorage {
   void flush();
 
   /// Commits the rest and closes the file, which then holds all of it and may be written by others.
-  /// There is no log beside it then, unless somebody reads the map. Throws Error (kind output). A detector of this map is of no use
-  /// afterwards: what it asks for throws Error (kind option).
+  /// There is no log beside it then, unless somebody reads the map. Throws Error (kind output). A
+  /// detector of this map is of no use afterwards: what it asks for throws Error (kind option).
   void finish();
 
   /// What features() found damaged so far, as MapReader::damage says it.

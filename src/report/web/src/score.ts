@@ -79,7 +79,10 @@ export class Score implements View {
     const low = scores.reduce((a, b) => Math.min(a, b), 0);
     const air = (top - low || 1) * 0.07;
     const side = Math.max(0.5, frames * 0.012);
-    return { x: [-side, frames - 1 + side], y: [low < 0 ? low - air : -0.4 * air, top + air] };
+    return {
+      x: [-side, Math.max(1, frames) - 1 + side],
+      y: [low < 0 ? low - air : -0.4 * air, top + air],
+    };
   }
 
   private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
