@@ -98,7 +98,7 @@ py::array_t<double> similarity_matrix(const Contents& queries,
   py::array_t<double> matrix({queries.size(), others.size()});
   double* cells = matrix.mutable_data();
   if (matrix.size() > 0) {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     fill_matrix(queries, others, shift_tolerance_columns, cells);
   }
   return matrix;
@@ -172,7 +172,7 @@ void bind_content(py::module_& module) {
         const cv::Mat pixels = to_image(image, "image");
         cv::Mat1f saliency;
         {
-          const py::gil_scoped_release release;
+          const WithoutGil release;
           saliency = saliency_map(gray_image(pixels), options);
         }
         return to_array(saliency);
@@ -184,7 +184,7 @@ void bind_content(py::module_& module) {
       "binary_content",
       [](ImageArgument image, const BinaryContentOptions& options) {
         const cv::Mat pixels = to_image(image, "image");
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         return binary_content(gray_image(pixels), options);
       },
       py::arg("image"), default_options,

@@ -30,7 +30,7 @@ namespace py = pybind11;
 using Path = std::filesystem::path;
 using Times = std::vector<std::optional<double>>;
 using Positions = std::vector<std::optional<cv::Vec3d>>;
-using Free = py::call_guard<py::gil_scoped_release>;
+using Free = py::call_guard<WithoutGil>;
 
 std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit) {
   if (every < 1 || limit < 0) {
@@ -47,7 +47,7 @@ std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limi
 Frame next_frame(SharedSource& source) {
   Frame frame;
   {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     if (source.next(frame)) return frame;
   }
   throw py::stop_iteration();
@@ -170,13 +170,13 @@ void bind_truth(py::module_& module) {
 
 /// To be called with the GIL, which is free meanwhile.
 std::vector<PlaceRun> place_runs_of(const std::string& path) {
-  const py::gil_scoped_release release;
+  const WithoutGil release;
   return read_place_runs(path);
 }
 
 /// As place_runs_of().
 Positions read_without_gil(const std::string& path, const Times& times_s, int every) {
-  const py::gil_scoped_release release;
+  const WithoutGil release;
   return read_positions(path, times_s, every);
 }
 

@@ -45,7 +45,7 @@ namespace py = pybind11;
 struct FreeAndLocked {
   explicit FreeAndLocked(std::recursive_mutex& mutex) : lock(mutex) {}
 
-  py::gil_scoped_release release;
+  WithoutGil release;
   std::scoped_lock<std::recursive_mutex> lock;
 };
 
@@ -213,7 +213,7 @@ void bind_detector(py::module_& module) {
       "threads may share one; it works for one at a time, without the GIL.")
       .def(py::init<const std::optional<LoopDetectorOptions>&, const std::shared_ptr<SharedMap>&>(),
            py::arg("options") = py::none(), py::arg("map") = py::none(),
-           py::call_guard<py::gil_scoped_release>(),
+           py::call_guard<WithoutGil>(),
            "Without options, those of the map, or the defaults. With a map, all places of its "
            "sessions are candidates, whatever the exclusion window; a MapWriter is continued with "
            "what is processed, a MapReader only asked. A map serves one detector. Raises "

@@ -78,7 +78,7 @@ void bind_matches(py::module_& module) {
   module.def(
       "read_match_list",
       [](const std::filesystem::path& path) { return read_match_list(path.string()); },
-      py::arg("path"), py::call_guard<py::gil_scoped_release>(),
+      py::arg("path"), py::call_guard<WithoutGil>(),
       "Reads a loops.csv, or any CSV of query,match[,score].");
 }
 
@@ -188,7 +188,7 @@ void bind_evaluation(py::module_& module) {
         return evaluate(list, truth, {tolerance_frames, protocol});
       },
       py::arg("matches"), py::arg("truth"), py::arg("tolerance_frames"), py::arg("protocol"),
-      py::call_guard<py::gil_scoped_release>());
+      py::call_guard<WithoutGil>());
 }
 
 }  // namespace loopbit::python

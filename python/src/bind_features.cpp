@@ -58,7 +58,7 @@ void bind_feature_types(py::module_& module) {
       "extract_surf",
       [](ImageArgument image, const SurfOptions& options) {
         const cv::Mat pixels = to_image(image, "image");
-        const py::gil_scoped_release release;
+        const WithoutGil release;
         return extract_surf(gray_image(pixels), options);
       },
       py::arg("image"), py::arg_v("options", SurfOptions{}, "SurfOptions()"),
@@ -88,7 +88,7 @@ void bind_verification(py::module_& module) {
       [](const Features& query, const Features& place, double max_ratio) {
         std::vector<Match> matches;
         {
-          const py::gil_scoped_release release;
+          const WithoutGil release;
           matches = match_features(query, place, max_ratio);
         }
         return take(std::move(matches));
@@ -98,7 +98,7 @@ void bind_verification(py::module_& module) {
       "and place.");
   module.def("verify", &verify, py::arg("query"), py::arg("place"),
              py::arg_v("options", VerificationOptions{}, "VerificationOptions()"),
-             py::call_guard<py::gil_scoped_release>(),
+             py::call_guard<WithoutGil>(),
              "Step 3 for one candidate: matching, then geometry by RANSAC with a fixed seed.");
 }
 

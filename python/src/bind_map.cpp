@@ -22,7 +22,7 @@ namespace {
 
 namespace py = pybind11;
 
-using Free = py::call_guard<py::gil_scoped_release>;
+using Free = py::call_guard<WithoutGil>;
 
 /// A row of places().
 struct PlaceRow {
@@ -76,7 +76,7 @@ template <typename Row>
 py::array array_of(SharedReader& map, std::vector<Row> (*rows_of)(MapReader&)) {
   std::vector<Row> rows;
   {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     rows = map.exclusively(rows_of);
   }
   return take(std::move(rows));
@@ -95,7 +95,7 @@ MapPlace place_of(const py::object& row) {
 
 std::optional<Features> features_of(SharedReader& map, const py::object& row) {
   const MapPlace place = place_of(row);
-  const py::gil_scoped_release release;
+  const WithoutGil release;
   return map.exclusively([&](MapReader& reader) { return reader.features_of(place); });
 }
 
@@ -103,7 +103,7 @@ std::optional<py::bytes> image_of(SharedReader& map, const py::object& row) {
   const MapPlace place = place_of(row);
   std::optional<std::vector<unsigned char>> jpeg;
   {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     jpeg = map.exclusively([&](MapReader& reader) { return reader.image_of(place); });
   }
   if (!jpeg) return std::nullopt;

@@ -21,7 +21,7 @@ namespace {
 namespace py = pybind11;
 
 using Path = std::filesystem::path;
-using Free = py::call_guard<py::gil_scoped_release>;
+using Free = py::call_guard<WithoutGil>;
 
 void bind_results(py::module_& module) {
   py::class_<MapCheck>(module, "MapCheck", "What there is in a map, and what of it is damaged.")

@@ -107,7 +107,7 @@ void bind_options(py::module_& module) {
              "The defaults changed by what the JSON text names; source is named in errors.");
   module.def(
       "load_options", [](const std::filesystem::path& path) { return load_options(path.string()); },
-      py::arg("path"), py::call_guard<py::gil_scoped_release>(), "options_from_json() of a file.");
+      py::arg("path"), py::call_guard<WithoutGil>(), "options_from_json() of a file.");
   module.def(
       "set_option",
       [](LoopDetectorOptions& options, const std::string& name, const py::object& value) {

@@ -38,7 +38,7 @@ void bind_place_index(py::module_& module) {
              const RetrievalOptions& options) {
             std::vector<Candidate> candidates;
             {
-              const py::gil_scoped_release release;
+              const WithoutGil release;
               candidates = self.query(content, end.value_or(self.size()), options);
             }
             return take(std::move(candidates));

@@ -2,12 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include <atomic>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <memory>
 #include <utility>
 
-#include <pybind11/functional.h>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -28,20 +26,51 @@
 namespace loopbit::python {
 namespace {
 
+/// A function of Python's that is told one thing, or None.
+template <typename Told>
+class Callback : public pybind11::object {
+ public:
+  static bool accept(PyObject* object) {
+    return object != nullptr && (object == Py_None || PyCallable_Check(object) != 0);
+  }
+  PYBIND11_OBJECT_DEFAULT(Callback, pybind11::object, accept)
+};
+
+}  // namespace
+}  // namespace loopbit::python
+
+namespace pybind11::detail {
+
+template <typename Told>
+struct handle_type_name<loopbit::python::Callback<Told>> {
+  // NOLINTNEXTLINE: pybind11's name
+  static constexpr auto name =
+      const_name("Callable[[") + make_caster<Told>::name + const_name("], None]");
+};
+
+}  // namespace pybind11::detail
+
+namespace loopbit::python {
+namespace {
+
 namespace py = pybind11;
 
 using Path = std::filesystem::path;
-using OnDetection = std::function<void(const Detection&)>;
-using OnBadFrame = std::function<void(const Text&)>;
+using OnDetection = Callback<Detection>;
+using OnBadFrame = Callback<Text>;
 using PositionRows = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using Free = py::call_guard<py::gil_scoped_release>;
+using Free = py::call_guard<WithoutGil>;
 
 /// What Python is told between two frames.
-template <typename Callback, typename... Arguments>
-void tell(const Callback& callback, const Arguments&... arguments) {
-  const py::gil_scoped_acquire acquire;
+template <typename Told>
+void tell(const Callback<Told>& callback, const Told& told) {
+  const WithGil acquire;
   check_signals();
-  if (callback) callback(arguments...);
+  if (callback.is_none()) return;
+  const py::tuple arguments = py::make_tuple(told);
+  const auto result = py::reinterpret_steal<py::object>(
+      unless_ended([&] { return PyObject_CallObject(callback.ptr(), arguments.ptr()); }));
+  if (!result) throw py::error_already_set();
 }
 
 std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector,
@@ -56,7 +85,7 @@ std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector
       .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, Text{sentence}); }};
   const std::atomic<bool> never{false};
   {
-    const py::gil_scoped_release release;
+    const WithoutGil release;
     detector.exclusively([&](LoopDetector& free) { run(source, free, listener, never); });
   }
   return detections;
@@ -79,7 +108,7 @@ void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_ba
       .on_detection = [](const Detection& /*detection*/) { check_signals(); },
       .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, Text{sentence}); }};
   const std::atomic<bool> never{false};
-  const py::gil_scoped_release release;
+  const WithoutGil release;
   recorded.detect(source, listener, keep_evidence, never);
 }
 
@@ -90,7 +119,7 @@ void keep_positions(RecordedRun& recorded, const PositionRows& positions_m) {
                              positions_m.at(row, 2));
     if (!std::isnan(cv::norm(position))) rows[static_cast<std::size_t>(row)] = position;
   }
-  const py::gil_scoped_release release;
+  const WithoutGil release;
   recorded.keep_positions(rows);
 }
 

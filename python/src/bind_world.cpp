@@ -20,7 +20,7 @@ namespace {
 
 namespace py = pybind11;
 
-using Free = py::call_guard<py::gil_scoped_release>;
+using Free = py::call_guard<WithoutGil>;
 
 /// Throws Error unless `world` has that frame.
 void check_frame(const World& world, int frame) {
@@ -39,7 +39,7 @@ void bind_world(py::module_& module) {
                                             "the same pictures on every machine.")
       .def(py::init([](const WorldOptions& options) {
              const WorldOptions own = options;  // others may change it while the GIL is free
-             const py::gil_scoped_release release;
+             const WithoutGil release;
              return std::make_shared<World>(own);
            }),
            py::arg_v("options", WorldOptions{}, "WorldOptions()"))
@@ -51,7 +51,7 @@ void bind_world(py::module_& module) {
             check_frame(self, frame);
             cv::Mat image;
             {
-              const py::gil_scoped_release release;
+              const WithoutGil release;
               image = self.render(frame);
             }
             return to_array(image);

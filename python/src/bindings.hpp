@@ -4,6 +4,8 @@
 
 #include <pybind11/pybind11.h>
 
+#include "gil.hpp"
+
 namespace loopbit::python {
 
 // Each adds one group of types and functions to the module, in an order in which a type comes
@@ -25,8 +27,8 @@ void bind_report(pybind11::module_& module);
 /// What work of many frames calls between two of them, with or without the GIL: throws what the
 /// interpreter's own signals raise, such as KeyboardInterrupt.
 inline void check_signals() {
-  const pybind11::gil_scoped_acquire acquire;
-  if (PyErr_CheckSignals() != 0) throw pybind11::error_already_set();
+  const WithGil acquire;
+  if (unless_ended([] { return PyErr_CheckSignals(); }) != 0) throw pybind11::error_already_set();
 }
 
 }  // namespace loopbit::python

@@ -38,6 +38,44 @@ for number, (read, text) in enumerate([
     read(path)
     thread.join()
 """
+# Ends while daemon threads are inside the module, or in what it calls.
+LEAVE_DAEMONS = """
+import os, sys, threading, time
+import loopbit
+
+world = loopbit.World(loopbit.WorldOptions(frames=5000, width_px=160, height_px=120))
+image = world.render(0)
+detector = loopbit.LoopDetector()
+started = threading.Semaphore(0)
+
+def process(number):
+    while True:
+        detector.process(image)
+        started.release()
+
+def run(number):
+    loopbit.run(world.source(), on_detection=lambda _: started.release())
+
+def run_slowly(number):
+    def wait(detection):
+        started.release()
+        time.sleep(0.01)
+    loopbit.run(world.source(), on_detection=wait)
+
+def run_folder(number):
+    started.release()
+    loopbit.run_folder(world.source(), os.path.join(sys.argv[2], str(number)))
+
+def write_dataset(number):
+    started.release()
+    world.write_dataset(os.path.join(sys.argv[2], str(number)))
+
+for number in range(4):
+    threading.Thread(target=globals()[sys.argv[1]], args=(number,), daemon=True).start()
+for _ in range(4):
+    started.acquire()
+time.sleep(0.2)
+"""
 
 
 def test_an_image_that_cannot_be_copied():
@@ -143,6 +181,16 @@ def test_names_that_are_no_utf8(dataset, tmp_path):
 
 def test_files_are_read_while_other_threads_run(tmp_path):
     subprocess.run([sys.executable, "-c", READ_PIPES, tmp_path], check=True, timeout=60)
+
+
+@pytest.mark.parametrize("work", ["process", "run", "run_slowly", "run_folder", "write_dataset"])
+def test_the_interpreter_may_end_while_daemon_threads_work(work, tmp_path):
+    for number in range(3):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        ended = subprocess.run([sys.executable, "-c", LEAVE_DAEMONS, work, folder], timeout=60,
+                               capture_output=True)
+        assert (ended.returncode, ended.stderr) == (0, b"")
 
 
 def test_a_data_set_being_written_can_be_stopped(tmp_path):
