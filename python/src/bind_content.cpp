@@ -148,14 +148,14 @@ void bind_comparison(py::module_& module) {
       },
       py::arg("content"),
       "M(O): the mean (x, y) of the set pixels, each in [0, 63]; (31.5, 31.5) if none is set.");
-  module.def("shift_columns", &shift_columns, py::arg("content"), py::arg("columns"),
+  module.def("shift_columns", &shift_columns, py::arg("content"), whole("columns"),
              "The content moved so many columns to the right (left if negative).");
   module.def("similarity", &checked_similarity, py::arg("a"), py::arg("b"),
-             py::arg("shift_tolerance_columns") = 0,
+             whole("shift_tolerance_columns") = 0,
              "xi(a, b) = |a & b| / max(|a|, |b|), in [0, 1], the largest over shifts of a by even "
              "numbers of columns up to the tolerance, and by it; Wang et al. 2019, section III-B.");
   module.def("similarity_matrix", &similarity_matrix, py::arg("queries"),
-             py::arg("places") = py::none(), py::arg("shift_tolerance_columns") = 0,
+             py::arg("places") = py::none(), whole("shift_tolerance_columns") = 0,
              "similarity() of every query (row) with every place (column), float64; without "
              "places, of every two queries.");
 }

@@ -84,8 +84,8 @@ void bind_source(py::module_& module) {
       .def("__repr__", [](const SharedSource& self) {
         return Text{fmt::format("ImageSource('{}')", self.description())};
       });
-  module.def("open_source", &open_shared, py::arg("input"), py::kw_only(), py::arg("every") = 1,
-             py::arg("limit") = 0, Free(),
+  module.def("open_source", &open_shared, py::arg("input"), py::kw_only(), whole("every") = 1,
+             whole("limit") = 0, Free(),
              "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
              "folder, a text file that lists images, an image, a video, or 'camera:N'. Every so "
              "many-th frame is read, at most so many (0: all).");
@@ -133,8 +133,8 @@ void bind_truth(py::module_& module) {
              return truth;
            }),
            py::arg("same_place"), py::arg("near_place") = py::tuple(),
-           py::arg("ignored") = py::tuple(), py::arg("unknown") = py::tuple(), py::arg("every") = 1,
-           py::arg("frames") = 0,
+           py::arg("ignored") = py::tuple(), py::arg("unknown") = py::tuple(), whole("every") = 1,
+           whole("frames") = 0,
            "From integers of shape (n, 2): query, match; or (n, 3): query, first, last; places are "
            "earlier frames.")
       .def_property_readonly(
@@ -188,7 +188,7 @@ void bind_poses(py::module_& module) {
       [](const Path& path, const Times& times_s, int every) {
         return to_array(read_without_gil(path.string(), times_s, every));
       },
-      py::arg("path"), py::arg("times_s"), py::arg("every") = 1,
+      py::arg("path"), py::arg("times_s"), whole("every") = 1,
       "Camera centres by KITTI poses, a TUM trajectory or EuRoC states, shape (n, 3), nan where "
       "not known: one for each time, None where a frame has none. Of the sequence's frames every "
       "so-many-th was read, at these times.");
@@ -197,7 +197,7 @@ void bind_poses(py::module_& module) {
       [](const Path& path, std::optional<std::size_t> frames, int every) {
         check_poses(path.string(), frames, every);
       },
-      py::arg("path"), py::arg("frames"), py::arg("every"), Free());
+      py::arg("path"), whole("frames"), whole("every"), Free());
 }
 
 }  // namespace
@@ -216,7 +216,7 @@ void bind_data(py::module_& module) {
          int every, const Times& times_s) {
         return read_truth(path.string(), {poses, variable, views, every}, times_s);
       },
-      py::arg("path"), py::arg("poses"), py::arg("variable"), py::arg("views"), py::arg("every"),
+      py::arg("path"), py::arg("poses"), py::arg("variable"), whole("views"), whole("every"),
       py::arg("times_s"), Free());
   module.def(
       "_read_place_runs", [](const Path& path) { return take(place_runs_of(path.string())); },
@@ -224,7 +224,7 @@ void bind_data(py::module_& module) {
   module.def(
       "_read_frame_list", [](const Path& path) { return read_frame_list(path.string()); },
       py::arg("path"), Free());
-  module.def("every_nth", &every_nth, py::arg("truth"), py::arg("every"), Free(),
+  module.def("every_nth", &every_nth, py::arg("truth"), whole("every"), Free(),
              "What the truth says where only every so many-th frame was read.");
 }
 

@@ -187,7 +187,7 @@ void bind_evaluation(py::module_& module) {
          const std::string& protocol) {
         return evaluate(list, truth, {tolerance_frames, protocol});
       },
-      py::arg("matches"), py::arg("truth"), py::arg("tolerance_frames"), py::arg("protocol"),
+      py::arg("matches"), py::arg("truth"), whole("tolerance_frames"), py::arg("protocol"),
       py::call_guard<WithoutGil>());
 }
 

@@ -115,7 +115,7 @@ void bind_session_frame(py::module_& module) {
       .def(py::init([](int session, int frame) {
              return SessionFrame{session, frame};
            }),
-           py::arg("session"), py::arg("frame"))
+           whole("session"), whole("frame"))
       .def_readonly("session", &SessionFrame::session,
                     "From 1, in the order in which the map met them.")
       .def_readonly("frame", &SessionFrame::frame, "In its session, from 0.")

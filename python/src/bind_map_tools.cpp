@@ -85,8 +85,8 @@ void bind_map_tools(py::module_& module) {
         }
         return compact_map(path.string(), {std::move(drop_sessions), max_places, drop_images});
       },
-      py::arg("path"), py::kw_only(), py::arg("drop_sessions") = CompactOptions{}.drop_sessions,
-      py::arg("max_places") = CompactOptions{}.max_places,
+      py::arg("path"), py::kw_only(), whole("drop_sessions") = CompactOptions{}.drop_sessions,
+      whole("max_places") = CompactOptions{}.max_places,
       py::arg("drop_images") = CompactOptions{}.drop_images, Free(),
       "Forgets sessions with their places and loops, then the places least missed beyond "
       "max_places (0: none), and the images, and gives their space back. The new file replaces the "

@@ -111,8 +111,9 @@ void bind_options(py::module_& module) {
   module.def(
       "set_option",
       [](LoopDetectorOptions& options, const std::string& name, const py::object& value) {
-        const std::string text = py::isinstance<py::bool_>(value)
-                                     ? (value.cast<bool>() ? "true" : "false")
+        py::detail::make_caster<bool> truth;  // NumPy's bools, too
+        const std::string text = truth.load(value, false)
+                                     ? py::detail::cast_op<bool>(truth) ? "true" : "false"
                                      : std::string(py::str(value));
         set_option(options, name, text);
       },

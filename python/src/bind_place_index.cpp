@@ -31,7 +31,7 @@ void bind_place_index(py::module_& module) {
       .def("__len__", &PlaceIndex::size)
       .def(
           "content", [](const PlaceIndex& self, PlaceId place) { return self.content(place); },
-          py::arg("place"), "A place's content. Raises IndexError where there is none.")
+          whole("place"), "A place's content. Raises IndexError where there is none.")
       .def(
           "query",
           [](const PlaceIndex& self, const BinaryContent& content, std::optional<PlaceId> end,

@@ -31,8 +31,7 @@ void write_run_report(const FinishedRun& run, const std::filesystem::path& name,
 
 void bind_report(py::module_& module) {
   module.def("_write_report", &write_run_report, py::arg("run"), py::arg("name"), py::arg("path"),
-             py::arg("tolerance_frames"), py::arg("protocol"),
-             py::call_guard<WithoutGil>());
+             whole("tolerance_frames"), py::arg("protocol"), py::call_guard<WithoutGil>());
 }
 
 }  // namespace loopbit::python

@@ -151,7 +151,7 @@ void bind_recorded_run(py::module_& module) {
              const std::string& protocol) {
             self.score(truth, {tolerance_frames, protocol});
           },
-          py::arg("truth"), py::arg("tolerance_frames"), py::arg("protocol"), Free())
+          py::arg("truth"), whole("tolerance_frames"), py::arg("protocol"), Free())
       .def("keep_positions", &keep_positions, py::arg("positions_m"))
       .def("finish", &RecordedRun::finish, py::arg("stopped_by"), Free());
 }

@@ -56,7 +56,7 @@ void bind_world(py::module_& module) {
             }
             return to_array(image);
           },
-          py::arg("frame"), "What the camera sees: BGR, uint8. About 25 ms for 640 x 480.")
+          whole("frame"), "What the camera sees: BGR, uint8. About 25 ms for 640 x 480.")
       .def(
           "pose",
           [](const World& self, int frame) {
@@ -64,7 +64,7 @@ void bind_world(py::module_& module) {
             const Pose pose = self.pose(frame);
             return std::tuple(pose.x_m, pose.y_m, pose.heading_rad);
           },
-          py::arg("frame"), "(x_m, y_m, heading_rad): east, north, from east to north.")
+          whole("frame"), "(x_m, y_m, heading_rad): east, north, from east to north.")
       .def(
           "truth",
           [](const World& self) {

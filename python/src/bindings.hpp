@@ -31,4 +31,8 @@ inline void check_signals() {
   if (unless_ended([] { return PyErr_CheckSignals(); }) != 0) throw pybind11::error_already_set();
 }
 
+/// An argument for whole numbers: what has a fraction is refused, where pybind11 would drop it from
+/// numbers that are not Python's own, such as numpy.float32.
+inline pybind11::arg whole(const char* name) { return pybind11::arg(name).noconvert(); }
+
 }  // namespace loopbit::python

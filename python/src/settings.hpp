@@ -25,8 +25,8 @@ const char* python_type() {
 template <typename Value>
 Value cast_value(const pybind11::handle& value, const std::string& name) {
   pybind11::detail::make_caster<Value> caster;
-  // Everything is a truth value to Python, but not to us.
-  constexpr bool kConvert = !std::is_same_v<Value, bool>;
+  // Everything is a truth value to Python, and a Decimal a whole number, but not to us.
+  constexpr bool kConvert = std::is_same_v<Value, double>;
   if (!caster.load(value, kConvert)) {
     throw pybind11::type_error(
         fmt::format("{} is {}, but must be {}.", name, literal(value), python_type<Value>()));

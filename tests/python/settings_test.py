@@ -3,7 +3,10 @@
 import json
 import pickle
 import re
+from decimal import Decimal
+from fractions import Fraction
 
+import numpy as np
 import pytest
 
 import loopbit
@@ -18,6 +21,9 @@ STRUCTS = [
     loopbit.PoseTruthOptions,
     loopbit.WorldOptions,
 ]
+
+# Numbers that turn themselves into whole ones, without their fractions.
+FRACTIONS = [np.float32(500.5), Decimal("500.5"), Fraction(1001, 2)]
 
 
 def settings_of(options):
@@ -94,10 +100,33 @@ def test_not_a_number_is_out_of_range():
 
 
 @pytest.mark.parametrize(
-    "name, value", [("max_keypoints", 500.5), ("max_keypoints", "500"), ("upright", 1)])
+    "name, value", [("max_keypoints", 500.5), ("max_keypoints", "500"), ("upright", 1),
+                    *(("max_keypoints", value) for value in FRACTIONS)])
 def test_wrong_type_is_a_type_error_that_names_the_setting(name, value):
-    with pytest.raises(TypeError, match=rf"surf\.{name} is {value!r}, but must be"):
+    with pytest.raises(TypeError, match=re.escape(f"surf.{name} is {value!r}, but must be")):
         loopbit.SurfOptions(**{name: value})
+
+
+@pytest.mark.parametrize("value", FRACTIONS)
+def test_an_argument_does_not_lose_its_fraction(value, tmp_path):
+    world = loopbit.World()
+    for call in (lambda: world.render(value), lambda: loopbit.SessionFrame(0, value),
+                 lambda: loopbit.open_source(tmp_path, every=value),
+                 lambda: loopbit.compact_map(tmp_path / "no.db", drop_sessions=[value]),
+                 lambda: loopbit.GroundTruth([[5, 1]], frames=value)):
+        with pytest.raises(TypeError):
+            call()
+
+
+def test_values_of_numpy():
+    options = loopbit.LoopDetectorOptions(
+        surf=loopbit.SurfOptions(max_keypoints=np.uint16(500), upright=np.bool_(False)),
+        binary_content=loopbit.BinaryContentOptions(gamma=np.float32(2.5)))
+    assert (options.surf.max_keypoints, options.surf.upright) == (500, False)
+    assert options.binary_content.gamma == 2.5
+    loopbit.set_option(options, "surf.upright", np.bool_(True))
+    assert options.surf.upright is True
+    assert loopbit.SessionFrame(np.int64(1), np.int32(2)) == loopbit.SessionFrame(1, 2)
 
 
 def test_unknown_names():
