@@ -15,6 +15,9 @@ class KnownLoops {
   /// A step of the path was found to show the same place as an earlier one.
   void add(std::ptrdiff_t step, std::ptrdiff_t earlier_step);
 
+  /// Adds the loops of `others`, without those of steps that have one here. Does not throw.
+  void take(KnownLoops& others) { first_visits_.merge(others.first_visits_); }
+
   /// The step of the first visit to the place that `step` shows, as far as loops at most 10 steps
   /// away tell; else `step` itself. Logarithmic in the loops.
   [[nodiscard]] std::ptrdiff_t first_visit(std::ptrdiff_t step) const;

@@ -196,16 +196,24 @@ class LoopDetector::Impl {
     return places;
   }
 
+  /// All of it or, where it throws, nothing: what needs memory comes first.
   void remember(Observation seen, const Detection& detection, const cv::Mat& image) {
+    recent_view_.reserve_next();
+    KnownLoops found;
+    if (detection.status == Status::loop) {
+      const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
+      found.add(seen.look.is_step ? latest + 1 : latest, known_loops_.first_visit(seen.best->step));
+    }
+    Agreement agreement = agreement_;
+    if (seen.look.is_step) {
+      if (seen.best) seen.verified.push_back(*seen.best);
+      agreement.remember(seen.verified);
+    }
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
     latest_view_inliers_ = seen.context.view_inliers;
-    if (detection.status == Status::loop) {
-      known_loops_.add(recent_view_.step_of(place), seen.best->step);
-    }
-    if (!seen.look.is_step) return;
-    if (seen.best) seen.verified.push_back(*seen.best);
-    agreement_.remember(seen.verified);
+    known_loops_.take(found);
+    agreement_ = std::move(agreement);
   }
 
   /// Never throws for its time, so that one bad frame cannot end a drive.

@@ -28,6 +28,10 @@ RecentView::Look RecentView::look(PlaceId newest, bool is_step,
   return look;
 }
 
+void RecentView::reserve_next() {
+  if (steps_.size() == steps_.capacity()) steps_.reserve(2 * steps_.size() + 1);
+}
+
 void RecentView::remember(PlaceId newest, const Look& look) {
   if (look.is_step) steps_.push_back(newest);
   far_step_ = look.far_step;

@@ -32,6 +32,9 @@ class RecentView {
   [[nodiscard]] Look look(PlaceId newest, bool is_step,
                           const std::function<bool(PlaceId)>& in_view) const;
 
+  /// Takes the memory that the next remember() needs, so that it does not throw.
+  void reserve_next();
+
   /// Makes `look` the present state. `newest` as in look().
   void remember(PlaceId newest, const Look& look);
 
