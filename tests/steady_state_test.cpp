@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 
 #include "loopbit/loop_detector.hpp"
+#include "loopbit/map_file.hpp"
+#include "loopbit/map_tools.hpp"
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
 
@@ -17,12 +19,13 @@
 namespace {
 
 std::atomic<int> allocations = 0;
-std::atomic<int> refused = -1;  ///< the number of the allocation that is refused
+thread_local int left_until_refused = -1;  ///< allocations of this thread; -1 = none is refused
 
 }  // namespace
 
 void* operator new(std::size_t size) {
-  if (allocations++ == refused) throw std::bad_alloc();
+  ++allocations;
+  if (left_until_refused >= 0 && left_until_refused-- == 0) throw std::bad_alloc();
   if (void* memory = std::malloc(size)) return memory;  // NOLINT(cppcoreguidelines-no-malloc)
   throw std::bad_alloc();
 }
@@ -81,13 +84,27 @@ TEST(SteadyState, VerificationAllocatesNothing) {
   EXPECT_EQ(allocations, before);
 }
 
-TEST(RefusedMemory, WhicheverItIsLeavesTheDetectorAsItWas) {
+/// The `n`-th allocation of this thread is refused while it lives.
+class Refusal {
+ public:
+  explicit Refusal(int n) { left_until_refused = n; }
+  ~Refusal() { left_until_refused = -1; }
+  Refusal(const Refusal&) = delete;
+  Refusal& operator=(const Refusal&) = delete;
+  Refusal(Refusal&&) = delete;
+  Refusal& operator=(Refusal&&) = delete;
+};
+
+LoopDetectorOptions small_options() {
   LoopDetectorOptions options;
   options.surf = {.working_area_px = 160 * 120, .max_keypoints = 100};
   options.decision.min_score = 5;
   options.decision.full_steps = 1;
-  LoopDetector undisturbed(options);
-  LoopDetector detector(options);
+  return options;
+}
+
+/// Of two laps, in which `detector` is refused each allocation of each frame in turn.
+void expect_same_answers(LoopDetector& detector, LoopDetector& undisturbed) {
   constexpr int kLap = 14;
   int loops = 0;
   for (int frame = 0; frame < 2 * kLap; ++frame) {
@@ -96,19 +113,38 @@ TEST(RefusedMemory, WhicheverItIsLeavesTheDetectorAsItWas) {
     loops += expected.status == Status::loop ? 1 : 0;
     std::optional<Detection> found;
     for (int n = 0; !found; ++n) {
-      refused = allocations + n;
       try {
+        const Refusal refusal(n);
         found = detector.process(image);
       } catch (const std::bad_alloc&) {
         ASSERT_EQ(detector.size(), frame) << "allocation " << n;
       }
-      refused = -1;
     }
     ASSERT_EQ(found->status, expected.status);
     ASSERT_EQ(found->match, expected.match);
     ASSERT_EQ(found->score, expected.score);
   }
   EXPECT_GT(loops, 5);
+}
+
+using RefusedMemory = ScratchTest;
+
+TEST_F(RefusedMemory, WhicheverItIsLeavesTheDetectorAsItWas) {
+  LoopDetector undisturbed(small_options());
+  LoopDetector detector(small_options());
+  expect_same_answers(detector, undisturbed);
+}
+
+TEST_F(RefusedMemory, WhicheverItIsLeavesTheMapAsItWas) {
+  const LoopDetectorOptions options = small_options();
+  const auto map = std::make_shared<MapWriter>(path("map.db"), options, "refused");
+  LoopDetector undisturbed(options);
+  LoopDetector detector(options, map);
+  expect_same_answers(detector, undisturbed);
+  map->finish();
+  const MapCheck check = check_map(path("map.db"));
+  EXPECT_EQ(check.places, undisturbed.size());
+  EXPECT_TRUE(check.damage.empty());
 }
 
 }  // namespace

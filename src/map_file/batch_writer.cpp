@@ -87,15 +87,16 @@ void BatchWriter::commit_batches() {
     added_.wait_for(lock, kMaxDelay,
                     [&] { return stop_ || in_a_hurry_ || pending_.size() >= kFramesPerBatch; });
     if (stop_) return;
-    const std::vector<AddedFrame> batch(pending_.begin(), pending_.end());
-    lock.unlock();
+    std::vector<AddedFrame> batch;
     std::exception_ptr error;
     try {
+      batch.assign(pending_.begin(), pending_.end());
+      lock.unlock();
       commit(batch);
     } catch (...) {
       error = std::current_exception();
     }
-    lock.lock();
+    if (!lock.owns_lock()) lock.lock();
     if (error) {
       error_ = error;
     } else {

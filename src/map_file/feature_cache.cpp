@@ -22,9 +22,11 @@ std::shared_ptr<const Features> FeatureCache::find(PlaceId place) {
 
 void FeatureCache::add(PlaceId place, std::shared_ptr<const Features> features) {
   if (find(place)) return;
-  bytes_ += bytes_of(*features);
-  entries_.push_front({place, std::move(features)});
-  at_[place] = entries_.begin();
+  std::list<Entry> entry;
+  entry.push_front({place, std::move(features)});
+  at_.emplace(place, entry.begin());
+  entries_.splice(entries_.begin(), entry);
+  bytes_ += bytes_of(*entries_.front().features);
   while (bytes_ > max_bytes_) {
     bytes_ -= bytes_of(*entries_.back().features);
     at_.erase(entries_.back().place);

@@ -20,6 +20,7 @@ class FeatureCache {
   /// Null if they are not there.
   std::shared_ptr<const Features> find(PlaceId place);
 
+  /// Stays as it was where memory is refused (std::bad_alloc).
   void add(PlaceId place, std::shared_ptr<const Features> features);
 
   [[nodiscard]] std::size_t bytes() const { return bytes_; }

@@ -4,6 +4,7 @@
 
 #include <ctime>
 #include <filesystem>
+#include <new>
 #include <random>
 #include <utility>
 
@@ -188,15 +189,22 @@ class MapWriter::Impl {
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& image) {
     StoredFeatures& places = stored();
+    places.reserve_next();
     writer_->add({.content = content,
                   .detection = detection,
                   .features = features,
                   .image = keeps_images_ ? halved_to_picture(image) : cv::Mat()});
-    places.keep(places.size(), std::move(features));
+    // From here on the frame is in the map: nothing may fail.
     const bool has_row = detection.status != Status::unreadable;
+    const PlaceId place = places.size();
     places.add(has_row ? first_place_ + detection.frame : StoredFeatures::kNoRow,
                {session_, detection.frame});
     ++frames_;
+    try {
+      places.keep(place, std::move(features));
+    } catch (const std::bad_alloc&) {
+      // They are read from the map, then.
+    }
   }
 
   [[nodiscard]] int session() const { return session_; }

@@ -28,6 +28,11 @@ class StoredFeatures {
   /// What stands for the row of a place that has none, as it has no features.
   static constexpr std::int64_t kNoRow = 0;
 
+  /// Takes the memory that the next add() needs, so that it does not throw.
+  void reserve_next() {
+    if (places_.size() == places_.capacity()) places_.reserve(2 * places_.size() + 1);
+  }
+
   /// Gives the row `id`, a place of `at`, the next number.
   void add(std::int64_t id, const SessionFrame& at) { places_.push_back({id, at}); }
 
