@@ -211,6 +211,12 @@ TEST(SaliencyMap, ReadsPartOfAnImage) {
   EXPECT_EQ(cv::norm(saliency_map(part), saliency_map(part.clone()), cv::NORM_INF), 0);
 }
 
+TEST(SaliencyMap, RefusesImagesThatAreTooSmall) {
+  expect_error(ErrorKind::input, {"empty", "32 x 32"}, [] { saliency_map(cv::Mat1b()); });
+  expect_error(ErrorKind::input, {"31 x 500", "32 x 32"},
+               [] { binary_content(cv::Mat1b(500, 31, std::uint8_t{9})); });
+}
+
 TEST(SaliencyMap, RefusesOptionsOutOfRange) {
   expect_error(ErrorKind::option, {"binary_content.blur_sigma_px", "0.1", "0.5"}, [] {
     saliency_map(textured_image({64, 64}, 0), {.blur_sigma_px = 0.1});

@@ -382,6 +382,11 @@ TEST(OptionsFromJson, NumbersBeyondAnyRangeAreNamed) {
                [] { options_from_json(R"({"surf": {"max_keypoints": 1e999}})", "a.json"); });
 }
 
+TEST(OptionsFromJson, UnknownSectionsAreRefusedEvenIfEmpty) {
+  expect_error(ErrorKind::option, {"a.json", "'sruf'", "surf", "decision"},
+               [] { options_from_json(R"({"sruf": {}})", "a.json"); });
+}
+
 TEST(OptionsFromJson, DeeplyNestedOnesAreRefused) {
   const std::string open(200'000, '[');
   const std::string close(200'000, ']');

@@ -401,6 +401,12 @@ TEST(Surf, DescriptorsHaveUnitLengthTimesTheirScale) {
   }
 }
 
+TEST(Surf, RefusesImagesThatAreTooSmall) {
+  expect_error(ErrorKind::input, {"empty", "32 x 32"}, [] { extract_surf(cv::Mat1b()); });
+  expect_error(ErrorKind::input, {"500 x 31", "32 x 32"},
+               [] { extract_surf(cv::Mat1b(31, 500, std::uint8_t{9})); });
+}
+
 TEST(Surf, RefusesOptionsOutOfRange) {
   expect_error(ErrorKind::option, {"surf.max_keypoints is 49", "50 and 10000"},
                [] { extract_surf(view(0), {.max_keypoints = 49}); });

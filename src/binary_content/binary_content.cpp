@@ -10,6 +10,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "loopbit/gray_image.hpp"
 #include "loopbit/image_shrinker.hpp"
 
 namespace loopbit {
@@ -159,6 +160,7 @@ double similarity(const BinaryContent& a, const BinaryContent& b, int shift_tole
 
 cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options) {
   validate(options, "binary_content");
+  check_size(gray);
   cv::Mat2f spectrum;
   cv::dft(resize_to_map(gray), spectrum, cv::DFT_COMPLEX_OUTPUT);
   const cv::Mat2f residual = residual_spectrum(spectrum, options.residual_radius_px);

@@ -14,19 +14,7 @@
 namespace loopbit {
 namespace {
 
-void check(const cv::Mat& image) {
-  if (image.empty()) {
-    throw Error(ErrorKind::input, "The image is empty; give one of at least 32 x 32 pixels.");
-  }
-  if (image.dims != 2) {
-    throw Error(ErrorKind::input,
-                fmt::format("The image has {} dimensions; give one of 2.", image.dims));
-  }
-  if (image.cols < kMinImageSidePx || image.rows < kMinImageSidePx) {
-    throw Error(ErrorKind::input,
-                fmt::format("The image has {} x {} pixels; at least {} x {} are needed.",
-                            image.cols, image.rows, kMinImageSidePx, kMinImageSidePx));
-  }
+void check_type(const cv::Mat& image) {
   const bool depth_known = image.depth() == CV_8U || image.depth() == CV_16U;
   const int channels = image.channels();
   if (!depth_known || (channels != 1 && channels != 3 && channels != 4)) {
@@ -68,6 +56,21 @@ cv::Mat1b stretch_to_8_bits(const cv::Mat1w& image) {
 
 }  // namespace
 
+void check_size(const cv::Mat& image) {
+  if (image.empty()) {
+    throw Error(ErrorKind::input, "The image is empty; give one of at least 32 x 32 pixels.");
+  }
+  if (image.dims != 2) {
+    throw Error(ErrorKind::input,
+                fmt::format("The image has {} dimensions; give one of 2.", image.dims));
+  }
+  if (image.cols < kMinImageSidePx || image.rows < kMinImageSidePx) {
+    throw Error(ErrorKind::input,
+                fmt::format("The image has {} x {} pixels; at least {} x {} are needed.",
+                            image.cols, image.rows, kMinImageSidePx, kMinImageSidePx));
+  }
+}
+
 GrayRange gray_range(const cv::Mat1w& image) {
   std::vector<std::size_t> histogram(65536, 0);
   for (const std::uint16_t value : image) ++histogram[value];
@@ -78,7 +81,8 @@ GrayRange gray_range(const cv::Mat1w& image) {
 }
 
 cv::Mat1b gray_image(const cv::Mat& image) {
-  check(image);
+  check_size(image);
+  check_type(image);
   cv::Mat gray = to_single_channel(image);
   if (gray.depth() == CV_16U) return stretch_to_8_bits(gray);
   return gray;

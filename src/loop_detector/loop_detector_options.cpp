@@ -7,7 +7,9 @@
 #include <fstream>
 #include <set>
 #include <string>
+#include <string_view>
 #include <type_traits>
+#include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -45,8 +47,18 @@ std::string to_text(const std::string& name, const Json& value) {
               fmt::format("{} is {}, but must be a number or a truth value.", name, value.dump()));
 }
 
+void check_is_section(const LoopDetectorOptions& options, const std::string& name) {
+  std::vector<std::string_view> names;
+  for_each_section(options,
+                   [&](std::string_view known, const auto& /*part*/) { names.push_back(known); });
+  if (std::find(names.begin(), names.end(), name) != names.end()) return;
+  throw Error(ErrorKind::option, fmt::format("There is no section '{}'; the sections are: {}.",
+                                             name, fmt::join(names, " ")));
+}
+
 void set_all(LoopDetectorOptions& options, const Json& json) {
   for (const auto& [section, settings] : json.items()) {
+    check_is_section(options, section);
     if (!settings.is_object()) {
       throw Error(ErrorKind::option, fmt::format("'{}' is {}, but must be an object of settings.",
                                                  section, settings.dump()));

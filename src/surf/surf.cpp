@@ -9,6 +9,7 @@
 #include <tuple>
 #include <vector>
 
+#include "loopbit/gray_image.hpp"
 #include "loopbit/image_shrinker.hpp"
 
 #include "hessian_pyramid.hpp"
@@ -63,6 +64,7 @@ class SurfExtractor::Impl {
   }
 
   void extract(const cv::Mat1b& gray, Features& features) {
+    check_size(gray);
     integral_.load(smoothed(working_image(gray)), kernels_);
     pyramid_.build(integral_, kernels_);
     maxima_.clear();

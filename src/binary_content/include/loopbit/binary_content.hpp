@@ -68,7 +68,8 @@ struct BinaryContentOptions {
 ///
 /// `gray`: 8 bits, at least 32 x 32. Hou and Zhang, "Saliency Detection: A Spectral Residual
 /// Approach", CVPR 2007, eq. 3 to 6; Wang et al. 2019, section III-A. Values are >= 0, and constant
-/// where the image is flat. Cost: see bm_binary_content.
+/// where the image is flat. Throws Error (kind input) if `gray` is smaller. Cost: see
+/// bm_binary_content.
 cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options = {});
 
 /// The pixels whose saliency exceeds gamma times the mean. An image without contrast has none.

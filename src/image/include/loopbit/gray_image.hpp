@@ -9,6 +9,9 @@ namespace loopbit {
 /// Images narrower or lower than this hold too little to recognise a place by.
 inline constexpr int kMinImageSidePx = 32;
 
+/// Throws Error (kind input) unless `image` has 2 dimensions and at least 32 x 32 pixels.
+void check_size(const cv::Mat& image);
+
 /// The grey levels between which all but the darkest and the brightest thousandth of a 16-bit image
 /// lie.
 struct GrayRange {

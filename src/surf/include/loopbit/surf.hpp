@@ -78,7 +78,8 @@ class SurfExtractor {
   std::unique_ptr<Impl> impl_;
 };
 
-/// SURF features of `gray`, 8 bits, at least 32 x 32 pixels.
+/// SURF features of `gray`, 8 bits, at least 32 x 32 pixels; throws Error (kind input) if it is
+/// smaller.
 ///
 /// Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 2008. The budget of keypoints
 /// decides: the strongest are kept, of which a cell of a grid may hold three times its share. What
