@@ -194,26 +194,77 @@ void expect_reaching_queries(const Kernels& kernels, const Counts& queries,
   }
 }
 
-/// What largest_coarse_sums finds, from its definition.
-void expect_largest_coarse_sums(const Kernels& kernels, const Counts& queries,
-                                const Counts& records) {
+/// What coarse_sums finds, from its definition; `records` are one after the other.
+void expect_coarse_sums(const Kernels& kernels, const Counts& queries, const Counts& records) {
+  const std::size_t num_queries = queries.size() / kCoarseCounts;
   const std::size_t num_records = records.size() / kCoarseCounts;
-  std::vector<std::uint16_t> sums(num_records, 9999);
+  std::vector<std::uint16_t> sums(num_queries * num_records, 9999);
   std::vector<std::uint16_t> largest(num_records / kInterleaved, 9999);
   const Counts groups = interleaved(records, kCoarseCounts, kInterleaved, kCountsAtOnce);
-  kernels.largest_coarse_sums(queries.data(), queries.size() / kCoarseCounts, groups.data(),
-                              largest.size(), sums.data(), largest.data());
+  kernels.coarse_sums(queries.data(), num_queries, groups.data(), largest.size(), sums.data(),
+                      largest.data());
   std::vector<std::uint16_t> expected_largest(largest.size());
   for (std::size_t i = 0; i < num_records; ++i) {
-    int expected = 0;
-    for (std::size_t q = 0; q < queries.size() / kCoarseCounts; ++q) {
-      expected = std::max(expected, sum_of_minima(queries, q, records, i, kCoarseCounts));
+    const std::size_t group = i / kInterleaved;
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      const std::uint16_t sum = sums[(group * num_queries + q) * kInterleaved + i % kInterleaved];
+      ASSERT_EQ(sum, sum_of_minima(queries, q, records, i, kCoarseCounts))
+          << "query " << q << ", record " << i;
+      expected_largest[group] = std::max(expected_largest[group], sum);
     }
-    ASSERT_EQ(sums[i], expected) << "record " << i;
-    std::uint16_t& of_group = expected_largest[i / kInterleaved];
-    of_group = std::max(of_group, sums[i]);
   }
-  ASSERT_EQ(largest, expected_largest);
+  EXPECT_EQ(largest, expected_largest);
+}
+
+/// Sums as coarse_sums leaves them, and what select_records has to know besides.
+struct SumsOfRecords {
+  std::size_t num_queries;
+  std::vector<std::uint16_t> sums;
+  std::vector<std::uint16_t> largest;
+  std::vector<std::uint16_t> smallest_counts;
+
+  [[nodiscard]] int sum(std::size_t q, std::size_t i) const {
+    return sums[(i / kInterleaved * num_queries + q) * kInterleaved + i % kInterleaved];
+  }
+};
+
+SumsOfRecords random_sums(Random& random, std::size_t num_queries, std::size_t num_groups) {
+  const auto up_to_4096 = [&] { return static_cast<std::uint16_t>(random.between(0, 4096)); };
+  SumsOfRecords records{num_queries, {}, {}, {}};
+  for (std::size_t group = 0; group < num_groups; ++group) {
+    std::uint16_t& largest = records.largest.emplace_back();
+    for (std::size_t i = 0; i < num_queries * kInterleaved; ++i) {
+      largest = std::max(largest, records.sums.emplace_back(up_to_4096()));
+    }
+    for (std::size_t i = 0; i < kInterleaved; ++i) records.smallest_counts.push_back(up_to_4096());
+  }
+  return records;
+}
+
+/// What select_records finds, from its definition.
+void expect_selected(const Kernels& kernels, const SumsOfRecords& records, Selection selection) {
+  selection.smallest_counts = records.smallest_counts.data();
+  const std::size_t num_records = records.smallest_counts.size();
+  std::vector<Selected> selected(num_records);
+  selected.resize(kernels.select_records(records.sums.data(), records.largest.data(),
+                                         records.num_queries, records.largest.size(), selection,
+                                         selected.data()));
+  auto found = selected.begin();
+  for (std::size_t i = 0; i < num_records; ++i) {
+    const int larger = std::max(selection.query_count, records.smallest_counts[i]);
+    int best = 0;
+    unsigned expected = 0;
+    for (std::size_t q = 0; q < records.num_queries; ++q) {
+      best = std::max(best, records.sum(q, i));
+      if (records.sum(q, i) >= larger * selection.floor / 65'536) expected |= 1U << q;
+    }
+    if (best < selection.lower || best >= selection.upper || expected == 0) continue;
+    ASSERT_NE(found, selected.end()) << "record " << i;
+    ASSERT_EQ(found->record, i);
+    ASSERT_EQ(found->queries, expected) << "record " << i;
+    ++found;
+  }
+  EXPECT_EQ(found, selected.end());
 }
 
 /// Coordinates in [-2, 2).
@@ -435,7 +486,7 @@ TEST_P(EveryKernel, SumsTheMinimaOfEachPairOfCounts) {
   for (std::size_t k = 0; k < kCoarseCounts * kInterleaved; ++k) {
     Counts one(kCoarseCounts * kInterleaved, 0);
     one[k] = 50;
-    expect_largest_coarse_sums(*GetParam(), Counts(kCoarseCounts, 64), one);
+    expect_coarse_sums(*GetParam(), Counts(kCoarseCounts, 64), one);
   }
 }
 
@@ -444,9 +495,9 @@ TEST_P(EveryKernel, SumsTheLargestCounts) {
   expect_reaching_queries(*GetParam(), full, {0b1111, 0b0101}, full, {4096, 4095, 4097, 0});
   expect_reaching_queries(*GetParam(), full, {0, 0b1000}, full, {0, 1, 2, 3});
   const Counts full_groups(2 * kInterleaved * kCoarseCounts, 64);
-  expect_largest_coarse_sums(*GetParam(), Counts(3 * kCoarseCounts, 64), full_groups);
-  expect_largest_coarse_sums(*GetParam(), {}, full_groups);
-  expect_largest_coarse_sums(*GetParam(), full, {});
+  expect_coarse_sums(*GetParam(), Counts(3 * kCoarseCounts, 64), full_groups);
+  expect_coarse_sums(*GetParam(), {}, full_groups);
+  expect_coarse_sums(*GetParam(), full, {});
 }
 
 TEST_P(EveryKernel, TakesA15InARecordFor16) {
@@ -465,7 +516,7 @@ TEST_P(EveryKernel, SumsCoarseCountsWhereQueriesHaveAny) {
     for (std::size_t k = kCoarseCounts - filled; k < kCoarseCounts; ++k) {
       queries[kCoarseCounts + k] = 40;
     }
-    expect_largest_coarse_sums(*GetParam(), queries, records);
+    expect_coarse_sums(*GetParam(), queries, records);
   }
 }
 
@@ -492,12 +543,12 @@ TEST_P(EveryKernel, FindsTheQueriesThatReachWhatARecordNeeds) {
   }
 }
 
-TEST_P(EveryKernel, FindsTheLargestCoarseSums) {
+TEST_P(EveryKernel, SumsTheMinimaOfCoarseCounts) {
   Random random;
   for (const int largest : {3, 64}) {
-    for (const std::size_t num_queries : {1U, 2U, 3U, 4U, 9U, 16U}) {
+    for (const std::size_t num_queries : {1U, 2U, 3U, 4U, 5U, 6U, 9U, 16U}) {
       for (const std::size_t num_groups : {1U, 2U, 5U}) {
-        expect_largest_coarse_sums(
+        expect_coarse_sums(
             *GetParam(), random_counts(random, num_queries * kCoarseCounts, largest),
             random_counts(random, num_groups * kInterleaved * kCoarseCounts, largest));
       }
@@ -505,30 +556,46 @@ TEST_P(EveryKernel, FindsTheLargestCoarseSums) {
   }
 }
 
-TEST_P(EveryKernel, SelectsTheSumsWithinLimits) {
+TEST_P(EveryKernel, SelectsRecordsWithinLimitsThatQueriesReach) {
   Random random;
-  std::vector<std::uint16_t> sums(5 * kInterleaved);
-  std::generate(sums.begin(), sums.end(),
-                [&] { return static_cast<std::uint16_t>(random.between(0, 4096)); });
-  sums[17] = 1;
-  sums[18] = 4096;
-  std::vector<std::uint16_t> largest;
-  for (auto group = sums.begin(); group != sums.end(); group += kInterleaved) {
-    largest.push_back(*std::max_element(group, group + kInterleaved));
-  }
-  for (const auto& [lower, upper] :
-       {std::pair{0, 32'767}, {1, 4097}, {1, 1}, {2000, 3000}, {4000, 4096}, {4096, 4097}}) {
-    std::vector<std::uint32_t> expected;
-    for (std::uint32_t i = 0; i < sums.size(); ++i) {
-      if (sums[i] >= lower && sums[i] < upper) expected.push_back(i);
+  for (const std::size_t num_queries : {1U, 5U, 16U}) {
+    SumsOfRecords records = random_sums(random, num_queries, 5);
+    std::fill_n(records.sums.begin(), num_queries * kInterleaved, std::uint16_t{1});
+    std::fill_n(records.sums.end() - kInterleaved, kInterleaved, std::uint16_t{4096});
+    records.largest.front() = 1;
+    records.largest.back() = 4096;
+    for (const auto& [lower, upper] :
+         {std::pair{0, 32'767}, {1, 4097}, {1, 1}, {2000, 3000}, {4000, 4096}, {4096, 4097}}) {
+      for (const int floor : {0, 1, 30'000, 50'000, 65'535}) {
+        for (const int query_count : {1, 2500, 4096}) {
+          expect_selected(*GetParam(), records,
+                          {.lower = static_cast<std::uint16_t>(lower),
+                           .upper = static_cast<std::uint16_t>(upper),
+                           .query_count = static_cast<std::uint16_t>(query_count),
+                           .floor = static_cast<std::uint16_t>(floor)});
+        }
+      }
     }
-    std::vector<std::uint32_t> numbers(sums.size());
-    numbers.resize(GetParam()->select_sums(sums.data(), largest.data(), largest.size(),
-                                           static_cast<std::uint16_t>(lower),
-                                           static_cast<std::uint16_t>(upper), numbers.data()));
-    EXPECT_EQ(numbers, expected) << lower << " to " << upper;
   }
-  EXPECT_EQ(GetParam()->select_sums(nullptr, nullptr, 0, 1, 2, nullptr), 0U);
+  EXPECT_EQ(GetParam()->select_records(nullptr, nullptr, 5, 0, {.lower = 1, .upper = 2}, nullptr),
+            0U);
+}
+
+TEST_P(EveryKernel, SelectsRecordsWhoseSumIsJustWhatIsNeeded) {
+  SumsOfRecords records{1,
+                        std::vector<std::uint16_t>(kInterleaved),
+                        {2049},
+                        std::vector<std::uint16_t>(kInterleaved, 4096)};
+  // Half of 4096 is needed, half of 4095 rounded down, of the query's 100.
+  records.smallest_counts[1] = 4095;
+  records.smallest_counts[2] = 99;
+  for (const int less : {0, 1}) {
+    records.sums[0] = static_cast<std::uint16_t>(2048 - less);
+    records.sums[1] = static_cast<std::uint16_t>(2047 - less);
+    records.sums[2] = static_cast<std::uint16_t>(50 - less);
+    expect_selected(*GetParam(), records,
+                    {.lower = 1, .upper = 4097, .query_count = 100, .floor = 32'768});
+  }
 }
 
 TEST_P(EveryKernel, SolvesSamplesOfSevenPairs) {

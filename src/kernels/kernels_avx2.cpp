@@ -353,49 +353,71 @@ __m256i coarse_sums_with_eight(const std::uint8_t* query, const std::uint8_t* ha
   return _mm256_madd_epi16(sums, _mm256_set1_epi16(1));
 }
 
-void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
-                         const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
-                         std::uint16_t* largest) {
+void coarse_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* groups,
+                 std::size_t num_groups, std::uint16_t* sums, std::uint16_t* largest) {
   constexpr std::size_t kHalf = kInterleaved / 2 * kCountsAtOnce;
   const CoarseChunks chunks = chunks_of(queries, num_queries);
   for (std::size_t group = 0; group < num_groups; ++group) {
     const std::uint8_t* counts = groups + group * kInterleaved * kCoarseCounts;
-    __m256i low = _mm256_setzero_si256();
-    __m256i high = _mm256_setzero_si256();
+    __m256i best = _mm256_setzero_si256();
     for (std::size_t q = 0; q < num_queries; ++q) {
       const std::uint8_t* query = queries + q * kCoarseCounts;
-      low = _mm256_max_epi32(low, coarse_sums_with_eight(query, counts, chunks));
-      high = _mm256_max_epi32(high, coarse_sums_with_eight(query, counts + kHalf, chunks));
+      const __m256i packed =
+          _mm256_packus_epi32(coarse_sums_with_eight(query, counts, chunks),
+                              coarse_sums_with_eight(query, counts + kHalf, chunks));
+      // Packing takes halves of the registers in turn.
+      const __m256i here = _mm256_permute4x64_epi64(packed, _MM_SHUFFLE(3, 1, 2, 0));
+      _mm256_storeu_si256(
+          reinterpret_cast<__m256i*>(sums + (group * num_queries + q) * kInterleaved), here);
+      best = _mm256_max_epu16(best, here);
     }
-    // Packing takes halves of the registers in turn.
-    const __m256i best =
-        _mm256_permute4x64_epi64(_mm256_packus_epi32(low, high), _MM_SHUFFLE(3, 1, 2, 0));
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + group * kInterleaved), best);
     largest[group] = largest_of_16(best);
   }
 }
 
-std::size_t select_sums(const std::uint16_t* sums, const std::uint16_t* largest,
-                        std::size_t num_groups, std::uint16_t lower, std::uint16_t upper,
-                        std::uint32_t* numbers) {
-  const __m256i first = _mm256_set1_epi16(static_cast<std::int16_t>(lower - 1));
-  const __m256i last = _mm256_set1_epi16(static_cast<std::int16_t>(upper));
-  std::size_t selected = 0;
+std::size_t select_records(const std::uint16_t* sums, const std::uint16_t* largest,
+                           std::size_t num_queries, std::size_t num_groups,
+                           const Selection& selection, Selected* selected) {
+  const auto of_16 = [](unsigned value) {
+    return _mm256_set1_epi16(static_cast<std::int16_t>(value));
+  };
+  const auto load_16 = [](const std::uint16_t* values) {
+    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values));
+  };
+  const __m256i lower = of_16(selection.lower);
+  const __m256i upper = of_16(selection.upper);
+  const __m256i floor = of_16(selection.floor);
+  const __m256i query_count = of_16(selection.query_count);
+  std::size_t num_selected = 0;
   for (std::size_t group = 0; group < num_groups; ++group) {
-    if (largest[group] < lower) continue;
-    const std::size_t i = group * kInterleaved;
-    const __m256i here = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(sums + i));
-    const __m256i between =
-        _mm256_and_si256(_mm256_cmpgt_epi16(here, first), _mm256_cmpgt_epi16(last, here));
-    const __m128i bytes =
-        _mm_packs_epi16(_mm256_castsi256_si128(between), _mm256_extracti128_si256(between, 1));
-    for (auto left = static_cast<std::uint32_t>(_mm_movemask_epi8(bytes)); left != 0;
+    if (largest[group] < selection.lower) continue;
+    const std::size_t first = group * kInterleaved;
+    const __m256i larger =
+        _mm256_max_epu16(load_16(selection.smallest_counts + first), query_count);
+    const __m256i need = _mm256_mulhi_epu16(larger, floor);
+    __m256i best = _mm256_setzero_si256();
+    __m256i bits = _mm256_setzero_si256();
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      const __m256i here = load_16(sums + first * num_queries + q * kInterleaved);
+      const __m256i reaches = _mm256_cmpeq_epi16(_mm256_max_epu16(here, need), here);
+      best = _mm256_max_epu16(best, here);
+      bits = _mm256_or_si256(bits, _mm256_and_si256(reaches, of_16(1U << q)));
+    }
+    const __m256i is_outside =
+        _mm256_or_si256(_mm256_cmpgt_epi16(lower, best),
+                        _mm256_or_si256(_mm256_cmpeq_epi16(_mm256_max_epu16(best, upper), best),
+                                        _mm256_cmpeq_epi16(bits, _mm256_setzero_si256())));
+    const __m128i bytes = _mm_packs_epi16(_mm256_castsi256_si128(is_outside),
+                                          _mm256_extracti128_si256(is_outside, 1));
+    alignas(32) std::uint16_t queries[kInterleaved];
+    _mm256_store_si256(reinterpret_cast<__m256i*>(queries), bits);
+    for (auto left = ~static_cast<std::uint32_t>(_mm_movemask_epi8(bytes)) & 0xFFFFU; left != 0;
          left &= left - 1) {
-      numbers[selected++] =
-          static_cast<std::uint32_t>(i) + static_cast<std::uint32_t>(__builtin_ctz(left));
+      const auto i = static_cast<std::size_t>(__builtin_ctz(left));
+      selected[num_selected++] = {static_cast<std::uint16_t>(first + i), queries[i]};
     }
   }
-  return selected;
+  return num_selected;
 }
 
 }  // namespace
@@ -403,8 +425,8 @@ std::size_t select_sums(const std::uint16_t* sums, const std::uint16_t* largest,
 const Kernels kAvx2Kernels{"avx2",
                            max_overlaps<overlap>,
                            reaching_queries<Pair>,
-                           largest_coarse_sums,
-                           select_sums,
+                           coarse_sums,
+                           select_records,
                            describe_constants,
                            nearest_two,
                            add_pixels,

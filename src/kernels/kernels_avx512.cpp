@@ -218,69 +218,97 @@ struct Pair {
 
 // Coarse counts: 16 records side by side. Two minima of at most 64 fit in 8 bits.
 
-/// `best`, raised to the sums of the minima of Count queries with 16 records.
+/// The sums of the minima of Count queries with the 16 records of a group; raises `best` to them.
 template <std::size_t Count>
-__m512i larger_coarse_sums(const std::uint8_t* queries, const std::uint8_t* group,
-                           const CoarseChunks& chunks, __m512i best) {
+__m256i coarse_sums_of_group(const std::uint8_t* queries, const std::uint8_t* group,
+                             const CoarseChunks& chunks, std::uint16_t* sums, __m256i best) {
   constexpr std::size_t kStride = kInterleaved * kCountsAtOnce;
-  __m512i sums[Count];
-  for (std::size_t q = 0; q < Count; ++q) sums[q] = _mm512_setzero_si512();
+  constexpr std::size_t kAhead = 8 * kInterleaved * kCoarseCounts;  // so far memory is asked for
+  __m512i all[Count];
+  for (std::size_t q = 0; q < Count; ++q) all[q] = _mm512_setzero_si512();
   for (std::size_t i = 0; i < chunks.size; i += 2) {
     const std::size_t c = chunks.numbers[i];
     const std::size_t d = chunks.numbers[i + 1];
+    __builtin_prefetch(group + kAhead + c * kStride);
+    __builtin_prefetch(group + kAhead + d * kStride);
     const __m512i low = _mm512_loadu_si512(group + c * kStride);
     const __m512i high = _mm512_loadu_si512(group + d * kStride);
     for (std::size_t q = 0; q < Count; ++q) {
       const auto* query = reinterpret_cast<const std::int8_t*>(queries + q * kCoarseCounts);
       const __m512i both = _mm512_add_epi8(_mm512_min_epu8(low, chunk(query, c)),
                                            _mm512_min_epu8(high, chunk(query, d)));
-      sums[q] = _mm512_dpbusd_epi32(sums[q], both, _mm512_set1_epi8(1));
+      all[q] = _mm512_dpbusd_epi32(all[q], both, _mm512_set1_epi8(1));
     }
   }
-  for (std::size_t q = 0; q < Count; ++q) best = _mm512_max_epi32(best, sums[q]);
+  for (std::size_t q = 0; q < Count; ++q) {
+    const __m256i packed = _mm512_cvtepi32_epi16(all[q]);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + q * kInterleaved), packed);
+    best = _mm256_max_epu16(best, packed);
+  }
   return best;
 }
 
-void largest_coarse_sums(const std::uint8_t* queries, std::size_t num_queries,
-                         const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
-                         std::uint16_t* largest) {
+void coarse_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* groups,
+                 std::size_t num_groups, std::uint16_t* sums, std::uint16_t* largest) {
   constexpr std::size_t kQueriesAtOnce = 5;  // as many shifts as are tolerated by default
   const CoarseChunks chunks = chunks_of(queries, num_queries);
   for (std::size_t group = 0; group < num_groups; ++group) {
     const std::uint8_t* counts = groups + group * kInterleaved * kCoarseCounts;
-    __m512i best = _mm512_setzero_si512();
+    std::uint16_t* here = sums + group * num_queries * kInterleaved;
+    __m256i best = _mm256_setzero_si256();
     std::size_t q = 0;
     for (; q + kQueriesAtOnce <= num_queries; q += kQueriesAtOnce) {
-      best = larger_coarse_sums<kQueriesAtOnce>(queries + q * kCoarseCounts, counts, chunks, best);
+      best = coarse_sums_of_group<kQueriesAtOnce>(queries + q * kCoarseCounts, counts, chunks,
+                                                  here + q * kInterleaved, best);
     }
     for (; q < num_queries; ++q) {
-      best = larger_coarse_sums<1>(queries + q * kCoarseCounts, counts, chunks, best);
+      best = coarse_sums_of_group<1>(queries + q * kCoarseCounts, counts, chunks,
+                                     here + q * kInterleaved, best);
     }
-    const __m256i packed = _mm512_cvtepi32_epi16(best);
-    _mm256_storeu_si256(reinterpret_cast<__m256i*>(sums + group * kInterleaved), packed);
-    largest[group] = largest_of_16(packed);
+    largest[group] = largest_of_16(best);
   }
 }
 
-std::size_t select_sums(const std::uint16_t* sums, const std::uint16_t* largest,
-                        std::size_t num_groups, std::uint16_t lower, std::uint16_t upper,
-                        std::uint32_t* numbers) {
+std::size_t select_records(const std::uint16_t* sums, const std::uint16_t* largest,
+                           std::size_t num_queries, std::size_t num_groups,
+                           const Selection& selection, Selected* selected) {
+  const auto of_16 = [](unsigned value) {
+    return _mm256_set1_epi16(static_cast<std::int16_t>(value));
+  };
+  const auto load_16 = [](const std::uint16_t* values) {
+    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values));
+  };
   const __m512i order = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  const __m256i first = _mm256_set1_epi16(static_cast<std::int16_t>(lower));
-  const __m256i last = _mm256_set1_epi16(static_cast<std::int16_t>(upper));
-  std::size_t selected = 0;
+  const __m256i lower = of_16(selection.lower);
+  const __m256i upper = of_16(selection.upper);
+  const __m256i floor = of_16(selection.floor);
+  const __m256i query_count = of_16(selection.query_count);
+  std::size_t num_selected = 0;
   for (std::size_t group = 0; group < num_groups; ++group) {
-    if (largest[group] < lower) continue;
-    const std::size_t i = group * kInterleaved;
-    const __m256i here = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(sums + i));
-    const __mmask16 between =
-        _mm256_mask_cmplt_epu16_mask(_mm256_cmpge_epu16_mask(here, first), here, last);
-    const __m512i all = _mm512_add_epi32(order, _mm512_set1_epi32(static_cast<int>(i)));
-    // What lies behind the selected ones is overwritten, and there is room for it.
-    _mm512_storeu_si512(numbers + selected, _mm512_maskz_compress_epi32(between, all));
-    selected += static_cast<std::size_t>(__builtin_popcount(between));
+    if (largest[group] < selection.lower) continue;
+    const std::size_t first = group * kInterleaved;
+    const __m256i larger =
+        _mm256_max_epu16(load_16(selection.smallest_counts + first), query_count);
+    const __m256i need = _mm256_mulhi_epu16(larger, floor);
+    __m256i best = _mm256_setzero_si256();
+    __m256i bits = _mm256_setzero_si256();
+    for (std::size_t q = 0; q < num_queries; ++q) {
+      const __m256i here = load_16(sums + first * num_queries + q * kInterleaved);
+      best = _mm256_max_epu16(best, here);
+      const __mmask16 reaches = _mm256_cmpge_epu16_mask(here, need);
+      bits = _mm256_or_si256(bits, _mm256_maskz_mov_epi16(reaches, of_16(1U << q)));
+    }
+    const __mmask16 is_within =
+        _mm256_mask_cmplt_epu16_mask(_mm256_cmpge_epu16_mask(best, lower), best, upper);
+    const __mmask16 is_selected = _mm256_mask_test_epi16_mask(is_within, bits, bits);
+    const __m512i numbers = _mm512_add_epi32(order, _mm512_set1_epi32(static_cast<int>(first)));
+    const __m512i both =
+        _mm512_or_si512(numbers, _mm512_slli_epi32(_mm512_cvtepu16_epi32(bits), 16));
+    // As Selected lies in memory. What is behind the last one is overwritten: there is room for it.
+    _mm512_storeu_si512(selected + num_selected, _mm512_maskz_compress_epi32(is_selected, both));
+    num_selected += static_cast<std::size_t>(__builtin_popcount(is_selected));
   }
-  return selected;
+  return num_selected;
 }
 
 }  // namespace
@@ -288,8 +316,8 @@ std::size_t select_sums(const std::uint16_t* sums, const std::uint16_t* largest,
 const Kernels kAvx512Kernels{"avx512",
                              max_overlaps<overlap>,
                              reaching_queries<Pair>,
-                             largest_coarse_sums,
-                             select_sums,
+                             coarse_sums,
+                             select_records,
                              describe_constants,
                              nearest_two,
                              add_pixels,

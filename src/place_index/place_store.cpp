@@ -70,7 +70,7 @@ void PlaceStore::extend_stretches(std::size_t place, const Growing& counts) {
     if ((place + 1) % kStretchPlaces[level] != 0) return;
     const Position at = position(level, place / kStretchPlaces[level]);
     at.bounds->maxima[at.record] = packed(growing.maxima);
-    at.bounds->smallest_counts[at.record] = growing.smallest_count;
+    *smallest_count(level, place / kStretchPlaces[level]) = growing.smallest_count;
     finer = &growing;
   }
   growing_[0] = {};

@@ -64,12 +64,13 @@ class PlaceStore {
   [[nodiscard]] int count(std::size_t place) const {
     return chunks_[place / kChunkPlaces].bounds->counts[place % kChunkPlaces];
   }
-  /// The smallest |O| in a stretch, and, up to the end of the chunk, in those after it.
+  /// The smallest |O| in a stretch, and in those after it: of the coarsest level, up to the end of
+  /// the chunk; of the others, up to the end of the coarsest stretch that holds it, for all of
+  /// which they share a cache line.
   [[nodiscard]] const std::uint16_t* smallest_counts(std::size_t level, std::size_t stretch) const {
-    const Position at = position(level, stretch);
-    return &at.bounds->smallest_counts[at.record];
+    return smallest_count(level, stretch);
   }
-  /// Likewise the largest block counts.
+  /// The largest block counts in a stretch, and, up to the end of the chunk, in those after it.
   [[nodiscard]] const PackedCounts* maxima(std::size_t level, std::size_t stretch) const {
     const Position at = position(level, stretch);
     return &at.bounds->maxima[at.record];
@@ -83,6 +84,7 @@ class PlaceStore {
   static constexpr std::size_t kChunkBits = 16;
   static constexpr std::size_t kChunkPlaces = std::size_t{1} << kChunkBits;
   static constexpr std::size_t kMaxChunks = (std::size_t{1} << 31U) / kChunkPlaces;
+  static constexpr std::size_t kCoarsestStretches = kChunkPlaces / kStretchPlaces.front();
   static constexpr std::size_t kChunkGroups = kChunkPlaces / kGroupPlaces;
 
   /// Where the records of each level begin in a chunk, and, last, how many there are.
@@ -94,10 +96,16 @@ class PlaceStore {
     return first;
   }();
 
+  /// The smallest |O| in the stretches within one of the coarsest. Those of a level with n of them
+  /// begin at n, and n goes up by powers of 2.
+  struct FinerSmallestCounts {
+    alignas(64) std::array<std::uint16_t, kStretchPlaces.front()> of;
+  };
   struct Bounds {
     std::array<CoarseGroup, kChunkGroups> coarse;
     std::array<PackedCounts, kFirstRecord.back()> maxima;
-    std::array<std::uint16_t, kFirstRecord.back()> smallest_counts;
+    std::array<FinerSmallestCounts, kCoarsestStretches> finer_smallest_counts;
+    std::array<std::uint16_t, kCoarsestStretches> smallest_counts;
     std::array<std::uint16_t, kChunkPlaces> counts;
   };
   struct Chunk {
@@ -122,6 +130,13 @@ class PlaceStore {
     const std::size_t bits = kChunkBits - kStretchBits[level];
     const std::size_t in_chunk = stretch & ((std::size_t{1} << bits) - 1);
     return {chunks_[stretch >> bits].bounds, kFirstRecord[level] + in_chunk};
+  }
+  [[nodiscard]] std::uint16_t* smallest_count(std::size_t level, std::size_t stretch) const {
+    const std::size_t bits = kStretchBits.front() - kStretchBits[level];
+    const Position at = position(0, stretch >> bits);
+    if (level == 0) return &at.bounds->smallest_counts[at.record];
+    const std::size_t siblings = std::size_t{1} << bits;
+    return &at.bounds->finer_smallest_counts[at.record].of[siblings + stretch % siblings];
   }
   [[nodiscard]] std::size_t num_chunks() const { return memory_.size() / 2; }
   void take_chunk();

@@ -26,12 +26,23 @@ constexpr std::size_t kAhead = 4;
 
 constexpr std::size_t kFinestPlaces = kStretchPlaces[kFinestLevel];
 
+/// Stretches of the next level in one of `level`.
+constexpr std::size_t children(std::size_t level) {
+  return kStretchPlaces[level] / kStretchPlaces[level + 1];
+}
+
+constexpr std::size_t kCacheLine_bytes = 64;
+
+/// No more than `similarity`, in steps of 1 / 65,536.
+std::uint16_t floor_in_16_bits(double similarity) {
+  return static_cast<std::uint16_t>(std::min(similarity * 65'536, 65'535.0));
+}
+
 /// What is asked for lies anywhere, and takes a hundred times as long as an instruction.
 void prefetch(const void* begin, std::size_t size_bytes) {
-  constexpr std::size_t kLine_bytes = 64;
   constexpr int kIntoSecondCache = 2;  // many at once would fill the queue of the first
   const auto* bytes = static_cast<const char*>(begin);
-  for (std::size_t at = 0; at < size_bytes; at += kLine_bytes) {
+  for (std::size_t at = 0; at < size_bytes; at += kCacheLine_bytes) {
     __builtin_prefetch(bytes + at, 0, kIntoSecondCache);
   }
 }
@@ -50,7 +61,8 @@ PrunedSearch::PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryCon
       found_(options) {
   prepare_shifts(query, options.shift_tolerance_columns);
   all_shifts_ = static_cast<std::uint16_t>((1U << group_counts_.size()) - 1);
-  coarse_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_ * kInterleaved);
+  coarse_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_ * kInterleaved *
+                                                                 coarse_counts_.size());
   largest_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_);
 }
 
@@ -84,9 +96,9 @@ void PrunedSearch::bound_tail() {
     for (std::size_t number = done / kStretchPlaces[level]; number < end; ++number) {
       add_to_run(level, number, 1, all_shifts_);
     }
-    bound_run(level);
     done = end * kStretchPlaces[level];
   }
+  bound_runs();
   for (; done < end_; ++done) compare_place(done);
 }
 
@@ -94,9 +106,9 @@ void PrunedSearch::bound_coarse_stretches() {
   const std::size_t shift_groups = coarse_counts_.size();
   for (std::size_t first = 0; first < num_groups_; first += kGroupRun) {
     const std::size_t groups = std::min(kGroupRun, num_groups_ - first);
-    kernels_.largest_coarse_sums(coarse_counts_.front().of.data(), shift_groups,
-                                 store_.coarse_group(first)->of.data(), groups,
-                                 &coarse_sums_[first * kInterleaved], &largest_sums_[first]);
+    kernels_.coarse_sums(coarse_counts_.front().of.data(), shift_groups,
+                         store_.coarse_group(first)->of.data(), groups,
+                         &coarse_sums_[first * kInterleaved * shift_groups], &largest_sums_[first]);
   }
   work_.coarse_stretches = static_cast<std::int64_t>(num_groups_ * kInterleaved);
 }
@@ -123,22 +135,23 @@ void PrunedSearch::search_coarse_stretches() {
 /// Bounds the coarsest stretches whose coarse sums are at least `lower` and below `upper`.
 void PrunedSearch::bound_sums_between(std::size_t lower, std::size_t upper) {
   const auto least = static_cast<std::size_t>(std::max(1, found_.least_overlap(query_count_)));
-  std::array<std::uint32_t, kGroupRun * kInterleaved>
-      selected;  // NOLINT: written before it is read
+  Selection selection{.lower = static_cast<std::uint16_t>(std::max(lower, least)),
+                      .upper = static_cast<std::uint16_t>(upper),
+                      .query_count = query_count_};
+  const std::size_t shift_groups = coarse_counts_.size();
+  std::array<Selected, kGroupRun * kInterleaved> selected;  // NOLINT: written before it is read
   for (std::size_t group = 0; group < num_groups_; group += kGroupRun) {
     const std::size_t first = group * kInterleaved;
-    const std::size_t num_selected = kernels_.select_sums(
-        &coarse_sums_[first], &largest_sums_[group], std::min(kGroupRun, num_groups_ - group),
-        static_cast<std::uint16_t>(std::max(lower, least)), static_cast<std::uint16_t>(upper),
-        selected.data());
+    selection.smallest_counts = store_.smallest_counts(0, first);
+    selection.floor = floor_in_16_bits(found_.floor().similarity);
+    const std::size_t num_selected = kernels_.select_records(
+        &coarse_sums_[first * shift_groups], &largest_sums_[group], shift_groups,
+        std::min(kGroupRun, num_groups_ - group), selection, selected.data());
     for (std::size_t i = 0; i < num_selected; ++i) {
-      const std::size_t number = first + selected[i];
-      const int larger = larger_count(*store_.smallest_counts(0, number));
-      if (coarse_sums_[number] < found_.least_overlap(larger)) continue;
-      add_to_run(0, number, 1, all_shifts_);
+      add_to_run(0, first + selected[i].record, 1, selected[i].queries);
     }
   }
-  bound_run(0);
+  bound_runs();
 }
 
 /// Searches what waits, down to the places.
@@ -156,60 +169,75 @@ void PrunedSearch::search_waiting() {
 
 /// Bounds the stretches of the next level within those that were taken.
 void PrunedSearch::bound_children(std::size_t level) {
-  const std::size_t children = kStretchPlaces[level] / kStretchPlaces[level + 1];
   for (const Stretch& stretch : taken_) {
     if (!may_matter(level, stretch)) continue;
-    add_to_run(level + 1, stretch.number * children, children, stretch.shifts);
+    add_to_run(level + 1, stretch.number * children(level), children(level), stretch.shifts);
   }
-  bound_run(level + 1);
+  bound_runs();
 }
 
 /// Compares the contents of the stretches that were taken.
 void PrunedSearch::compare_taken() {
-  for (std::size_t i = 0; i < taken_.size(); ++i) {
-    if (i + kAhead < taken_.size()) {
-      prefetch(&store_.content(taken_[i + kAhead].number * kFinestPlaces),
+  for (std::size_t i = taken_.size(); i-- > 0;) {
+    if (i >= kAhead) {
+      prefetch(&store_.content(taken_[i - kAhead].number * kFinestPlaces),
                kFinestPlaces * sizeof(BinaryContent));
     }
     if (may_matter(kFinestLevel, taken_[i])) compare_stretch(taken_[i]);
   }
 }
 
-/// Adds consecutive stretches, all of one chunk, to those that one call of a kernel bounds. A run
-/// is of one level, and each two of it have the same shifts.
+/// Adds consecutive stretches, all of one chunk, to those that one call of a kernel bounds.
 void PrunedSearch::add_to_run(std::size_t level, std::size_t first, std::size_t stretches,
                               std::uint16_t shifts) {
-  if (run_.size + stretches > kRun) bound_run(level);
+  Run& run = runs_[level];
+  if (run.size + stretches > kRun) bound_run(level);
   const PackedCounts* maxima = store_.maxima(level, first);
   const std::uint16_t* smallest = store_.smallest_counts(level, first);
+  if (level == 0) prefetch(store_.smallest_counts(1, first * children(0)), kCacheLine_bytes);
   for (std::size_t i = 0; i < stretches; ++i) {
-    const std::size_t at = run_.size++;
+    const std::size_t at = run.size++;
     const std::uint16_t larger = larger_count(smallest[i]);
-    run_.numbers[at] = static_cast<std::uint32_t>(first + i);
-    run_.maxima[at] = maxima[i].of.data();
-    prefetch(run_.maxima[at], kPackedBytes);
-    run_.larger_counts[at] = larger;
-    run_.least_sums[at] = static_cast<std::uint16_t>(std::max(1, found_.least_overlap(larger)));
-    run_.shifts[at / 2] = shifts;
+    run.numbers[at] = static_cast<std::uint32_t>(first + i);
+    run.maxima[at] = maxima[i].of.data();
+    prefetch(run.maxima[at], kPackedBytes);
+    run.larger_counts[at] = larger;
+    run.least_sums[at] = static_cast<std::uint16_t>(std::max(1, found_.least_overlap(larger)));
+    std::uint16_t& of_both = run.shifts[at / 2];
+    of_both = at % 2 == 0 ? shifts : static_cast<std::uint16_t>(of_both | shifts);
   }
 }
 
-/// Bounds the stretches of the run, and lets those wait that may matter.
+/// Bounds the stretches of a run. Of the coarsest that may matter, nearly all would be looked into
+/// anyway, so their halves are at once; finer ones wait.
 void PrunedSearch::bound_run(std::size_t level) {
+  Run& run = runs_[level];
+  if (run.size == 0) return;
   std::array<Reached, kRun> reached;  // NOLINT: written before it is read
-  kernels_.reaching_queries(group_counts_.front().of.data(), run_.shifts.data(), run_.maxima.data(),
-                            run_.size, run_.least_sums.data(), reached.data());
+  kernels_.reaching_queries(group_counts_.front().of.data(), run.shifts.data(), run.maxima.data(),
+                            run.size, run.least_sums.data(), reached.data());
   // Which ones are kept is hard to foresee: gathering them first takes no branch.
   std::array<Stretch, kRun> kept;  // NOLINT: written before it is read
   std::size_t num_kept = 0;
-  for (std::size_t i = 0; i < run_.size; ++i) {
-    kept[num_kept] = {run_.numbers[i], reached[i].largest_sum, run_.larger_counts[i],
+  for (std::size_t i = 0; i < run.size; ++i) {
+    kept[num_kept] = {run.numbers[i], reached[i].largest_sum, run.larger_counts[i],
                       reached[i].queries};
     num_kept += reached[i].queries != 0 ? 1U : 0U;
   }
-  for (std::size_t i = 0; i < num_kept; ++i) waiting_.push(level, kept[i]);
-  work_.stretches[level] += static_cast<std::int64_t>(run_.size);
-  run_.size = 0;
+  work_.stretches[level] += static_cast<std::int64_t>(run.size);
+  run.size = 0;
+  for (std::size_t i = 0; i < num_kept; ++i) {
+    if (level == 0) {
+      add_to_run(1, kept[i].number * children(0), children(0), kept[i].shifts);
+    } else {
+      waiting_.push(level, kept[i]);
+    }
+  }
+}
+
+/// Bounds what is left in the runs, and what is added to finer ones then.
+void PrunedSearch::bound_runs() {
+  for (std::size_t level = 0; level < runs_.size(); ++level) bound_run(level);
 }
 
 /// Compares the contents of a finest stretch with the query at the shifts that may matter.

@@ -48,7 +48,7 @@ class PrunedSearch {
     std::array<std::uint32_t, kRun> numbers;
     std::array<std::uint16_t, kRun> larger_counts;
     std::array<std::uint16_t, kRun> least_sums;  ///< that may matter
-    std::array<std::uint16_t, kRun / 2> shifts;  ///< of each two
+    std::array<std::uint16_t, kRun / 2> shifts;  ///< of each two, which share them
     std::size_t size = 0;
   };
 
@@ -70,6 +70,7 @@ class PrunedSearch {
   void add_to_run(std::size_t level, std::size_t first, std::size_t stretches,
                   std::uint16_t shifts);
   void bound_run(std::size_t level);
+  void bound_runs();
   void compare_stretch(const Stretch& stretch);
   void compare_place(std::size_t place);
   void consider(std::size_t place, int overlap);
@@ -87,12 +88,12 @@ class PrunedSearch {
   std::uint16_t all_shifts_ = 0;                   ///< a bit for each group of shifts
   std::vector<BlockCounts> group_counts_;          ///< for each group of shifts, the maxima
   std::vector<CoarseCounts> coarse_counts_;        ///< likewise
-  std::unique_ptr<std::uint16_t[]> coarse_sums_;   ///< for each coarsest stretch, the largest sum
+  std::unique_ptr<std::uint16_t[]> coarse_sums_;   ///< see Kernels::coarse_sums
   std::unique_ptr<std::uint16_t[]> largest_sums_;  ///< for each group of stretches
   FoundPlaces found_;
   StretchQueue waiting_;
-  std::vector<Stretch> taken_;  ///< from those that wait
-  Run run_;
+  std::vector<Stretch> taken_;                   ///< from those that wait
+  std::array<Run, kStretchPlaces.size()> runs_;  ///< by level
   RetrievalWork work_;
 };
 

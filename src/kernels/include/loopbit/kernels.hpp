@@ -27,6 +27,21 @@ struct Reached {
   std::uint16_t queries;  ///< a bit for each that has the least sum that is needed
 };
 
+/// Which records to select: those whose largest sum is at least `lower` and below `upper`, both at
+/// most 32,767, and that some query reaches. A query reaches record i if its sum is at least
+/// max(query_count, smallest_counts[i]) * floor / 65,536, rounded down.
+struct Selection {
+  std::uint16_t lower = 0;
+  std::uint16_t upper = 0;
+  std::uint16_t query_count = 0;
+  std::uint16_t floor = 0;
+  const std::uint16_t* smallest_counts = nullptr;
+};
+struct Selected {
+  std::uint16_t record;
+  std::uint16_t queries;  ///< a bit for each that reaches it
+};
+
 /// 8-bit values in one descriptor, from -127 to 127.
 inline constexpr std::size_t kDescriptorSize = 64;
 
@@ -135,20 +150,19 @@ struct Kernels {
                            const std::uint8_t* const* records, std::size_t num_records,
                            const std::uint16_t* least, Reached* reached);
 
-  /// The largest of such sums over all queries, of coarse counts in [0, 64]: each query has its 64
-  /// in order, the records come in groups of 16 interleaved ones. sums[16 * g + i] belongs to
-  /// record i of group g, and largest[g] is the largest of them.
+  /// All such sums of coarse counts in [0, 64]: each query has its 64 in order, the records come in
+  /// groups of 16 interleaved ones. sums[(g * num_queries + q) * 16 + i] belongs to query q and
+  /// record i of group g, and largest[g] is the largest of group g.
   /// Cost: num_queries * num_groups * 1 KB of minimum and sum, less where no query has a count.
-  void (*largest_coarse_sums)(const std::uint8_t* queries, std::size_t num_queries,
-                              const std::uint8_t* groups, std::size_t num_groups,
-                              std::uint16_t* sums, std::uint16_t* largest);
+  void (*coarse_sums)(const std::uint8_t* queries, std::size_t num_queries,
+                      const std::uint8_t* groups, std::size_t num_groups, std::uint16_t* sums,
+                      std::uint16_t* largest);
 
-  /// numbers[0], numbers[1], ... = those i, in order, for which sums[i] is at least `lower` and
-  /// below `upper`, both at most 32,767; returns how many there are. The sums are those of groups
-  /// of 16, of which largest[g] is the largest of group g, and `numbers` has room for all.
-  std::size_t (*select_sums)(const std::uint16_t* sums, const std::uint16_t* largest,
-                             std::size_t num_groups, std::uint16_t lower, std::uint16_t upper,
-                             std::uint32_t* numbers);
+  /// The records, in order, that such sums of at most 16 queries and 4,096 groups leave; returns
+  /// how many there are. `selected` has room for all.
+  std::size_t (*select_records)(const std::uint16_t* sums, const std::uint16_t* largest,
+                                std::size_t num_queries, std::size_t num_groups,
+                                const Selection& selection, Selected* selected);
 
   /// constants[i] = what this variant's nearest_two has to know of the i-th descriptor.
   void (*describe_constants)(const std::int8_t* descriptors, std::size_t num_descriptors,
