@@ -337,36 +337,40 @@ __m256i four_counts(const std::uint8_t* query, std::size_t first) {
   return _mm256_set1_epi32(bytes);
 }
 
-/// The sums of the minima of a query with 8 records, in 32-bit lanes.
-__m256i coarse_sums_with_eight(const std::uint8_t* query, const std::uint8_t* half,
-                               const CoarseChunks& chunks) {
-  const auto minimum = [&](std::size_t chunk) {
-    return _mm256_min_epu8(load(half + chunk * kInterleaved * kCountsAtOnce),
-                           four_counts(query, chunk * kCountsAtOnce));
-  };
-  __m256i sums = _mm256_setzero_si256();
+/// The sums of the minima of a query with the 16 records of a group.
+__m256i coarse_sums_of_group(const std::uint8_t* query, const std::uint8_t* group,
+                             const CoarseChunks& chunks) {
+  constexpr std::size_t kHalf = kInterleaved / 2 * kCountsAtOnce;
+  const __m256i ones = _mm256_set1_epi8(1);
+  __m256i low = _mm256_setzero_si256();
+  __m256i high = _mm256_setzero_si256();
   for (std::size_t i = 0; i < chunks.size; i += 2) {
-    const __m256i both =
-        _mm256_add_epi8(minimum(chunks.numbers[i]), minimum(chunks.numbers[i + 1]));
-    sums = _mm256_add_epi16(sums, _mm256_maddubs_epi16(both, _mm256_set1_epi8(1)));
+    const std::size_t c = chunks.numbers[i] * kCountsAtOnce;
+    const std::size_t d = chunks.numbers[i + 1] * kCountsAtOnce;
+    const __m256i query_c = four_counts(query, c);
+    const __m256i query_d = four_counts(query, d);
+    const auto sums_with = [&](const std::uint8_t* half) {
+      const __m256i both = _mm256_add_epi8(_mm256_min_epu8(load(half + c * kInterleaved), query_c),
+                                           _mm256_min_epu8(load(half + d * kInterleaved), query_d));
+      return _mm256_maddubs_epi16(both, ones);
+    };
+    low = _mm256_add_epi16(low, sums_with(group));
+    high = _mm256_add_epi16(high, sums_with(group + kHalf));
   }
-  return _mm256_madd_epi16(sums, _mm256_set1_epi16(1));
+  const auto of_eight = [](__m256i sums) { return _mm256_madd_epi16(sums, _mm256_set1_epi16(1)); };
+  // Packing takes halves of the registers in turn.
+  return _mm256_permute4x64_epi64(_mm256_packus_epi32(of_eight(low), of_eight(high)),
+                                  _MM_SHUFFLE(3, 1, 2, 0));
 }
 
 void coarse_sums(const std::uint8_t* queries, std::size_t num_queries, const std::uint8_t* groups,
                  std::size_t num_groups, std::uint16_t* sums, std::uint16_t* largest) {
-  constexpr std::size_t kHalf = kInterleaved / 2 * kCountsAtOnce;
   const CoarseChunks chunks = chunks_of(queries, num_queries);
   for (std::size_t group = 0; group < num_groups; ++group) {
     const std::uint8_t* counts = groups + group * kInterleaved * kCoarseCounts;
     __m256i best = _mm256_setzero_si256();
     for (std::size_t q = 0; q < num_queries; ++q) {
-      const std::uint8_t* query = queries + q * kCoarseCounts;
-      const __m256i packed =
-          _mm256_packus_epi32(coarse_sums_with_eight(query, counts, chunks),
-                              coarse_sums_with_eight(query, counts + kHalf, chunks));
-      // Packing takes halves of the registers in turn.
-      const __m256i here = _mm256_permute4x64_epi64(packed, _MM_SHUFFLE(3, 1, 2, 0));
+      const __m256i here = coarse_sums_of_group(queries + q * kCoarseCounts, counts, chunks);
       _mm256_storeu_si256(
           reinterpret_cast<__m256i*>(sums + (group * num_queries + q) * kInterleaved), here);
       best = _mm256_max_epu16(best, here);
