@@ -67,13 +67,13 @@ class PlaceStore;
 /// The binary contents of all places, and the question which of them look like a query.
 ///
 /// One thread may add while any number of others ask: a query sees the places that were there when
-/// it began, and contents never move. Memory: 609 bytes a place, 512 of them its content.
+/// it began, and contents never move. Memory: 610 bytes a place, 512 of them its content.
 class PlaceIndex {
  public:
   /// All in memory.
   PlaceIndex();
   /// The contents in a file without a name in `scratch_folder`, mapped to memory, which holds what
-  /// the bounds need, 97 bytes a place. The file is gone when the index is. Throws Error (kind
+  /// the bounds need, 98 bytes a place. The file is gone when the index is. Throws Error (kind
   /// output) if it cannot be made.
   explicit PlaceIndex(const std::string& scratch_folder);
   ~PlaceIndex();
