@@ -16,6 +16,7 @@ const kFlags = [
   "--disable-component-update",
   "--disable-sync",
 ];
+
 export const kWide = { width: 1440, height: 900 };
 
 /** `modules`: the node_modules that holds playwright-core. */
@@ -97,3 +98,10 @@ export const shownFrame = async (page) => Number(await page.inputValue("#frame-n
 /** Name and value of the address after '#'. */
 export const address = async (page) =>
   Object.fromEntries(new URLSearchParams(new URL(page.url()).hash.slice(1)));
+
+/** Whether truth lists an earlier place for the frame, and its loop, if any, is not right. */
+export function isMissed(run, frame) {
+  const verdict = run.verdict[frame];
+  const isRevisit = run.truth?.same_place.some((query, i) => i % 3 === 0 && query === frame);
+  return verdict === "missed" || (verdict === "wrong" && isRevisit === true);
+}

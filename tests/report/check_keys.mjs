@@ -8,6 +8,7 @@ import {
   drawn,
   embedded,
   goTo,
+  isMissed,
   kWide,
   settled,
   shownFrame,
@@ -17,6 +18,7 @@ import {
 const framesWith = (run, filter) =>
   run.verdict.flatMap((verdict, i) => {
     if (filter === "all") return [i];
+    if (filter === "missed") return isMissed(run, i) ? [i] : [];
     const isIn =
       filter === "loops" ? run.status_names[run.status[i]] === "loop" : verdict === filter;
     return isIn ? [i] : [];

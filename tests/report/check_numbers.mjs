@@ -3,7 +3,7 @@
 // The numbers on the page are those of the data and of run.json.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { assertShows, embedded, goTo, settled, textOf } from "./browser.mjs";
+import { assertShows, embedded, goTo, isMissed, settled, textOf } from "./browser.mjs";
 
 const kSteps = ["content", "retrieval", "features", "verification"];
 const kFilters = ["loops", "right", "wrong", "missed", "tolerated", "elsewhere"];
@@ -174,6 +174,11 @@ export async function checkNumbers(page, runJson) {
   for (const name of kFilters.slice(1)) {
     counts[name] = run.verdict.filter((verdict) => verdict === name).length;
   }
+  counts.missed = run.verdict.filter((_, frame) => isMissed(run, frame)).length;
+  if (run.evaluation) {
+    const { positives, right } = run.evaluation;
+    assert.equal(counts.missed, positives - right, "revisits without a right loop");
+  }
   for (const [name, count] of Object.entries(counts)) {
     assertShows(await textOf(page, `filter.${name}`), count, `frames that are ${name}`);
   }
@@ -264,16 +269,18 @@ export async function checkPairs(page) {
   const run = (await embedded(page)).runs[0];
   const loops = run.status.flatMap((status, i) => (run.status_names[status] === "loop" ? [i] : []));
   const others = run.match.flatMap((match, i) => (match >= 0 && !loops.includes(i) ? [i] : []));
+  const close = others.filter((frame) => Math.abs(run.score[frame] - run.threshold) < 0.01);
   let compared = 0;
-  for (const frame of [...spread(loops, 12), ...spread(others, 6)]) {
+  for (const frame of [...spread(loops, 12), ...spread(others, 6), ...spread(close, 2)]) {
     await goTo(page, frame);
     const match = run.match[frame];
     await checkTag(page, run, frame);
-    assertShows(
-      (await textOf(page, "pair.score")).split(/[≥<]/)[0],
-      run.score[frame],
-      `score of ${frame}`,
-    );
+    const [score] = (await textOf(page, "pair.score")).split(/[≥<]/);
+    assertShows(score, run.score[frame], `score of ${frame}`);
+    if (run.threshold !== null) {
+      const isAccepted = Number(score.replaceAll(",", "")) >= run.threshold;
+      assert.equal(isAccepted, run.score[frame] >= run.threshold, `side of ${score} of ${frame}`);
+    }
     for (const name of ["matches", "inliers", "similarity"]) {
       if (run[name])
         assertShows(await textOf(page, `pair.${name}`), run[name][frame], `${name} of ${frame}`);

@@ -99,6 +99,8 @@ function detect(places, quality, options, next) {
       statusOf(isUnreadable ? "unreadable" : isEarly ? "no_earlier_place" : judged),
     );
   }
+  const close = columns.status.indexOf(statusOf("low_score"));
+  if (close >= 0) columns.score[close] = kThreshold - 0.0004;
   return columns;
 }
 

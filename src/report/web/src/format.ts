@@ -19,8 +19,20 @@ export const similarity = share;
  * Scores are sums of halves as a rule, but another detector's may be anything: probabilities near 0
  * and near 1 stay told from these.
  */
-export function score(value: number | null): string {
+export function score(value: number | null, threshold: number | null = null): string {
   if (value === null) return kMissing;
+  const text = rounded(value);
+  // On which side of the threshold it lies must show.
+  if (threshold === null || value === threshold || text !== rounded(threshold)) return text;
+  for (let digits = 3; digits < 17; ++digits) {
+    const longer = value.toPrecision(digits);
+    if (Number(longer) < threshold === value < threshold && Number(longer) !== threshold)
+      return longer;
+  }
+  return String(value);
+}
+
+function rounded(value: number): string {
   if (Number.isInteger(value)) return count(value);
   const size = Math.abs(value);
   if (size >= 1) return value.toFixed(size >= 100 ? 1 : 2).replace(/\.?0+$/, "");

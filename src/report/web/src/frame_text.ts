@@ -14,7 +14,8 @@ export function frameText(model: RunModel, frame: number): string[] {
   if (mark) lines[0] += `: ${nameOf(mark)}`;
   else lines[0] += `: ${nameOfStatus(model.status(frame))}`;
   if (model.matchName(frame) !== null) {
-    lines.push(`${candidateName(model, frame)}, score ${format.score(model.score(frame))}`);
+    const score = format.score(model.score(frame), model.run.threshold);
+    lines.push(`${candidateName(model, frame)}, score ${score}`);
   }
   return lines;
 }

@@ -4,11 +4,19 @@
 import { html } from "./dom.ts";
 import * as format from "./format.ts";
 import type { RunModel } from "./run_model.ts";
-import { kMarked, markIcon, meaningOf, nameOf } from "./verdicts.ts";
+import { kMarked, type Marked, markIcon, meaningOf, nameOf } from "./verdicts.ts";
 
 export interface Legend {
   element: HTMLElement;
   show(model: RunModel): void;
+}
+
+/** Revisits with a wrong loop are missed, too, though another mark is drawn. */
+function numberOf(model: RunModel, verdict: Marked): string {
+  const marked = model.framesMarked(verdict).length;
+  const all = verdict === "missed" ? model.framesIn(verdict).length : marked;
+  const others = all - marked;
+  return format.count(all) + (others > 0 ? ` (${format.count(others)} marked as wrong)` : "");
 }
 
 /** The marks that occur, with their names and numbers. */
@@ -25,7 +33,7 @@ export function legend(): Legend {
             "li",
             { title: meaningOf(verdict) },
             markIcon(verdict),
-            `${nameOf(verdict)} ${format.count(model.framesMarked(verdict).length)}`,
+            `${nameOf(verdict)} ${numberOf(model, verdict)}`,
           ),
         );
       element.replaceChildren(...entries);

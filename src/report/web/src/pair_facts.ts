@@ -49,7 +49,7 @@ export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] 
   const facts = html(
     "dl",
     { class: "facts" },
-    fact("score", "score", has ? format.score(score) : "–", has ? limit : null),
+    fact("score", "score", has ? format.score(score, threshold) : "–", has ? limit : null),
     fact(
       "similarity ξ",
       "similarity",

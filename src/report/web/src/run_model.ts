@@ -160,6 +160,7 @@ export class RunModel {
     if (!frames) {
       if (filter === "all") frames = this.where(() => true);
       else if (filter === "loops") frames = this.where((frame) => this.isLoop(frame));
+      else if (filter === "missed") frames = this.where((frame) => this.isMissed(frame));
       else frames = this.framesMarked(filter);
       this.members.set(filter, frames);
     }
@@ -205,6 +206,12 @@ export class RunModel {
   mark(frame: number): Marked | null {
     const verdict = this.verdict(frame);
     return isMarked(verdict) && (verdict !== "ignored" || this.isLoop(frame)) ? verdict : null;
+  }
+
+  /** A revisit without a right loop; one with a wrong loop is marked as that. */
+  private isMissed(frame: number): boolean {
+    const mark = this.mark(frame);
+    return mark === "missed" || (mark === "wrong" && this.truePlace(frame) !== null);
   }
 
   private where(passes: (frame: number) => boolean): number[] {
