@@ -46,6 +46,7 @@ const kSamples = {
   "another detector, frames not known": { external: true, truth: false, poses: false },
   "three runs": { runs: 3, external: true, longNames: true },
   "one frame": { frames: 1 },
+  "a wrong loop at a revisit": { frames: 600 },
   "two frames": { frames: 2, truth: false, poses: false },
 };
 /** Most of a check is waiting for what is on the screen. */
