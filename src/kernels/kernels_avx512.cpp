@@ -272,32 +272,14 @@ void coarse_sums(const std::uint8_t* queries, std::size_t num_queries, const std
 std::size_t select_records(const std::uint16_t* sums, const std::uint16_t* largest,
                            std::size_t num_queries, std::size_t num_groups,
                            const Selection& selection, Selected* selected) {
-  const auto of_16 = [](unsigned value) {
-    return _mm256_set1_epi16(static_cast<std::int16_t>(value));
-  };
-  const auto load_16 = [](const std::uint16_t* values) {
-    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values));
-  };
   const __m512i order = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-  const __m256i lower = of_16(selection.lower);
-  const __m256i upper = of_16(selection.upper);
-  const __m256i floor = of_16(selection.floor);
-  const __m256i query_count = of_16(selection.query_count);
+  const __m256i lower = _mm256_set1_epi16(static_cast<std::int16_t>(selection.lower));
+  const __m256i upper = _mm256_set1_epi16(static_cast<std::int16_t>(selection.upper));
   std::size_t num_selected = 0;
   for (std::size_t group = 0; group < num_groups; ++group) {
     if (largest[group] < selection.lower) continue;
     const std::size_t first = group * kInterleaved;
-    const __m256i larger =
-        _mm256_max_epu16(load_16(selection.smallest_counts + first), query_count);
-    const __m256i need = _mm256_mulhi_epu16(larger, floor);
-    __m256i best = _mm256_setzero_si256();
-    __m256i bits = _mm256_setzero_si256();
-    for (std::size_t q = 0; q < num_queries; ++q) {
-      const __m256i here = load_16(sums + first * num_queries + q * kInterleaved);
-      best = _mm256_max_epu16(best, here);
-      const __mmask16 reaches = _mm256_cmpge_epu16_mask(here, need);
-      bits = _mm256_or_si256(bits, _mm256_maskz_mov_epi16(reaches, of_16(1U << q)));
-    }
+    const auto [best, bits] = reaching_group(sums, num_queries, group, selection);
     const __mmask16 is_within =
         _mm256_mask_cmplt_epu16_mask(_mm256_cmpge_epu16_mask(best, lower), best, upper);
     const __mmask16 is_selected = _mm256_mask_test_epi16_mask(is_within, bits, bits);

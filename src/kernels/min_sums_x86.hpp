@@ -41,6 +41,35 @@ static CoarseChunks chunks_of(const std::uint8_t* queries, std::size_t num_queri
   return chunks;
 }
 
+/// Of each of 16 records the largest sum of all queries, and the bits of those that reach it.
+struct ReachingGroup {
+  __m256i largest_sums;
+  __m256i queries;
+};
+
+/// `group`: its number among those that `sums` and `selection` are of.
+static ReachingGroup reaching_group(const std::uint16_t* sums, std::size_t num_queries,
+                                    std::size_t group, const Selection& selection) {
+  const auto of_16 = [](unsigned value) {
+    return _mm256_set1_epi16(static_cast<std::int16_t>(value));
+  };
+  const auto load_16 = [](const std::uint16_t* values) {
+    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values));
+  };
+  const std::size_t first = group * kInterleaved;
+  const __m256i larger =
+      _mm256_max_epu16(load_16(selection.smallest_counts + first), of_16(selection.query_count));
+  const __m256i need = _mm256_mulhi_epu16(larger, of_16(selection.floor));
+  ReachingGroup found{_mm256_setzero_si256(), _mm256_setzero_si256()};
+  for (std::size_t q = 0; q < num_queries; ++q) {
+    const __m256i here = load_16(sums + first * num_queries + q * kInterleaved);
+    const __m256i reaches = _mm256_cmpeq_epi16(_mm256_max_epu16(here, need), here);
+    found.largest_sums = _mm256_max_epu16(found.largest_sums, here);
+    found.queries = _mm256_or_si256(found.queries, _mm256_and_si256(reaches, of_16(1U << q)));
+  }
+  return found;
+}
+
 /// Kernels::reaching_queries on top of one variant's Pair, a type of internal linkage for the
 /// reason that kernel_variants.hpp gives: it holds two records, sums the minima in 64-bit lanes, of
 /// which four queries share the 16-bit quarters, and reduces them to the four sums with the first
