@@ -22,7 +22,7 @@ export class Filters implements View {
   readonly element = html("div", {
     class: "filters",
     role: "group",
-    "aria-label": "Frames to walk through",
+    "aria-label": "Frames to show",
   });
   private readonly buttons = new Map<Filter, HTMLButtonElement>();
   private readonly counts = new Map<Filter, HTMLElement>();

@@ -70,6 +70,6 @@ export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] 
     facts.append(fact("took", "took", `${format.milliseconds(model.totals_ms[frame] ?? 0)} ms`));
   }
   if (model.isWithCandidate(selection) || !has) return [line, why, facts];
-  const whose = `With its ${candidateName(model, frame)}, which is not shown:`;
+  const whose = `Values of its ${candidateName(model, frame)}, which is not shown:`;
   return [html("p", { class: "whose", "data-key": "pair.whose" }, whose), line, why, facts];
 }

@@ -70,11 +70,11 @@ export class Trajectory implements View {
         })
       : ringOf(frames);
     this.caption.textContent = positions
-      ? `The drive in metres, in the plane in which it reaches furthest (${positions.axes.join(" and ")} of its positions), with a line from each query to its match. Click a frame to see its pair.`
-      : "The frames in order around a ring, clockwise from the top, with a line from each query to its match. --poses FILE shows the drive as it was.";
+      ? `The trajectory in metres, in the plane of its largest extent (${positions.axes.join(" and ")}). A line connects each query with its match. Click a frame to see its pair.`
+      : "The frames on a ring, clockwise from the top. A line connects each query with its match. --poses FILE shows the real trajectory.";
     if (model.loopsElsewhere().length > 0) {
       this.caption.append(
-        " A loop into another session has no line: its match is none of these frames.",
+        " A loop into another session has no line, because its match is not one of these frames.",
       );
     }
     this.element.classList.toggle("ring", this.isRing);
