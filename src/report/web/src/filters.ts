@@ -17,7 +17,7 @@ function isOffered(filter: Filter, frames: number, hasTruth: boolean): boolean {
   return filter === "all" || filter === "loops" || hasTruth;
 }
 
-/** Which frames the arrow keys walk. */
+/** The filter of the frames that the arrow keys visit. */
 export class Filters implements View {
   readonly element = html("div", {
     class: "filters",

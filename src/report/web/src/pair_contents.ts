@@ -12,7 +12,7 @@ import { onThemeChange, type Theme, theme } from "./theme.ts";
 
 type Paint = (pixel: number, theme: Theme) => string | null;
 
-/** Saliency and binary content of both, their AND at the best shift, and xi. */
+/** Saliency and binary content of both frames, their AND at the best shift, and xi. */
 export class PairContents {
   readonly element = html("div", { class: "contents" });
   private repaint: (() => void)[] = [];

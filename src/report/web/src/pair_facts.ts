@@ -13,7 +13,7 @@ function fact(name: string, key: string, ...value: Child[]): HTMLElement {
   return html("div", {}, html("dt", {}, name), html("dd", { "data-key": `pair.${key}` }, ...value));
 }
 
-/** What was decided about the frame, and on what numbers: those with its best candidate. */
+/** The decision for the frame, and the numbers of its best candidate. */
 export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] {
   const { run } = model;
   const { frame } = selection;

@@ -14,12 +14,12 @@ import type { Theme } from "./theme.ts";
 import { drawMarks, kMarked, markRadius, type Point } from "./verdicts.ts";
 import { caption, section, type View } from "./view.ts";
 
-/** A marked frame is meant even where the path comes a little nearer. */
+/** A marked frame wins over a slightly nearer point of the path. */
 const kMarkedFirst_px = -6;
 const kCurveSteps = 10;
 const kManyLoops = 1500;
 
-/** The drive with its loops; without positions the frames on a ring. */
+/** The trajectory with its loops; without positions the frames on a ring. */
 export class Trajectory implements View {
   readonly element: HTMLElement;
   private readonly caption = caption();
@@ -157,7 +157,7 @@ export class Trajectory implements View {
     ctx.globalAlpha = 1;
   }
 
-  /** Straight in the plane; towards the middle on the ring, so that chords come apart. */
+  /** Straight in the plane; curved towards the centre on the ring, so that chords separate. */
   private addLink(path: Path2D, to: Projection, from: Point, match: Point, count: number): void {
     path.moveTo(to.x(from.x), to.y(from.y));
     const steps = this.isRing && count < kManyLoops ? kCurveSteps : 1;
