@@ -408,9 +408,9 @@ class CommandLineTest(CommandTest):
         for arguments, words in ((["walk"], "no command 'walk'"), (["--foo"], "no option '--foo'"),
                                  (["map", "lst", "x.db"], "no command 'lst'"),
                                  (["map", "--foo"], "no option '--foo'"),
-                                 ([*run, "--every", "2.5"], "'2.5' is no whole number from 1"),
-                                 ([*run, "--limit", "-1"], "'-1' is no whole number from 0"),
-                                 ([*run, "--pictures-mb", "nan"], "'nan' is no number from 0")):
+                                 ([*run, "--every", "2.5"], "'2.5' is not a whole number from 1"),
+                                 ([*run, "--limit", "-1"], "'-1' is not a whole number from 0"),
+                                 ([*run, "--pictures-mb", "nan"], "'nan' is not a number from 0")):
             with self.subTest(arguments):
                 ran = loopbit(*arguments)
                 self.assertEqual(ran.returncode, 2, ran.stderr)

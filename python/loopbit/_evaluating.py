@@ -64,8 +64,8 @@ def read_truth(
     ):
         if given and kind != needed:
             raise _loopbit.OptionError(
-                f"{name} is about {_words(needed)}, but '{path}' is {_words(kind)}; leave it out, "
-                "or name another file."
+                f"{name} applies to {_words(needed)}, but '{path}' is {_words(kind)}; leave it "
+                "out, or give another file."
             )
     truth = _loopbit._read_truth(path, settings, variable, rows, every, list(times_s))
     if not_false is None and ignore is None:
@@ -86,8 +86,8 @@ def check_kind(protocol: str, path: Path) -> None:
     named, kind = _loopbit.find_protocol(protocol), _loopbit.truth_kind(path)
     if named.truth_kind != kind:
         raise _loopbit.OptionError(
-            f"protocol '{protocol}' is defined on {_words(named.truth_kind)}, but '{path}' "
-            f"is {_words(kind)}; name another file, or leave out the protocol."
+            f"protocol '{protocol}' requires {_words(named.truth_kind)}, but '{path}' "
+            f"is {_words(kind)}; give another file, or leave out the protocol."
         )
 
 
@@ -96,8 +96,8 @@ def check_value(protocol: str) -> None:
     if protocol:
         kind = _loopbit.find_protocol(protocol).truth_kind
         raise _loopbit.OptionError(
-            f"protocol '{protocol}' is defined on {_words(kind)}, and this truth does not say that "
-            "it is by those; give truth as the path of a file, or leave out the protocol."
+            f"protocol '{protocol}' requires {_words(kind)}, but a GroundTruth has no known kind; "
+            "give truth as the path of a file, or leave out the protocol."
         )
 
 
@@ -142,7 +142,7 @@ def evaluate(
     elif isinstance(truth, GroundTruth):
         check_value(protocol)
     if truth is None:
-        raise _loopbit.OptionError("Nothing says what is true; give truth.")
+        raise _loopbit.OptionError("There is no ground truth; give truth.")
     if tolerance < 0:
         raise _loopbit.OptionError(f"tolerance_frames is {tolerance}, but must be 0 or more.")
     matches = _matches(found)
@@ -177,7 +177,7 @@ def _record(run: FinishedRun) -> dict[str, Any]:
         record = None
     if not isinstance(record, dict):
         raise _loopbit.InputError(
-            f"The run.json in '{run.path}' is no record of a run: it was changed after loopbit "
+            f"The run.json in '{run.path}' is not a record of a run: it was changed after loopbit "
             "wrote it; run again."
         )
     return record

@@ -98,7 +98,7 @@ def _check_from_start(source: ImageSource, **files: object) -> None:
         if taken and isinstance(file, (str, os.PathLike)):
             raise _loopbit.OptionError(
                 f"{name} is '{os.fspath(file)!s}', which counts from the first frame, but {taken} "
-                "frames of the source were taken before; open it anew."
+                "frames of the source were already read; open it again."
             )
 
 
@@ -139,7 +139,7 @@ def run_folder(
     every, frames = source.every, _loopbit._frames_left(source)
     _check_from_start(source, truth=truth, positions_m=positions_m)
     if keep_images and not map:
-        raise _loopbit.OptionError("keep_images keeps them in a map; give map, or leave it out.")
+        raise _loopbit.OptionError("keep_images stores images in a map; give map, or leave it out.")
     if not callable(on_bad_frame):
         raise TypeError(f"on_bad_frame is {on_bad_frame!r}, but must be callable.")
     _check_truth(truth, protocol, every, frames)
@@ -193,7 +193,7 @@ def _check_truth(
     if truth is None:
         if protocol:
             raise _loopbit.OptionError(
-                f"protocol '{protocol}' is about truth; give truth, or leave out the protocol."
+                f"protocol '{protocol}' applies to truth; give truth, or leave out the protocol."
             )
     elif isinstance(truth, GroundTruth):
         check_value(protocol)
@@ -213,7 +213,7 @@ def _check_positions(positions_m: numpy.typing.NDArray[Any], frames: int | None)
     if frames is not None and len(positions_m) != frames:
         raise ValueError(f"positions_m has {len(positions_m)} rows, but there are {frames} frames.")
     if numpy.isinf(positions_m).any():
-        raise ValueError("positions_m is infinite somewhere, but must be nan where not known.")
+        raise ValueError("positions_m is infinite somewhere, but must be nan if unknown.")
 
 
 def _plain(text: str) -> str:

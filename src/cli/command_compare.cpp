@@ -68,7 +68,7 @@ FramesRead share_frames(std::vector<ListedRun>& runs) {
       if (static_cast<std::size_t>(match.query) < known->frames.times_s.size()) continue;
       throw Error(
           ErrorKind::input,
-          fmt::format("'{}' tells of frame {}, but '{}' has {} frames; compare runs on the "
+          fmt::format("'{}' has a match for frame {}, but '{}' has {} frames; compare runs on the "
                       "same images.",
                       run.run.name, match.query, known->run.name, known->frames.times_s.size()));
     }
@@ -94,7 +94,7 @@ std::vector<ReportRun> read_runs(const CompareFlags& flags) {
   const auto judged = std::find_if(runs.begin(), runs.end(),
                                    [](const ReportRun& run) { return run.truth.has_value(); });
   if (judged == runs.end()) {
-    throw Error(ErrorKind::option, "None of the runs says what is true; add --truth FILE.");
+    throw Error(ErrorKind::option, "None of the runs has ground truth; add --truth FILE.");
   }
   for (ReportRun& run : runs) {
     run.truth = judged->truth;
@@ -163,17 +163,16 @@ void compare_command(const CompareFlags& flags) {
 
 void add_compare(CLI::App& app) {
   auto flags = std::make_shared<CompareFlags>();
-  CLI::App* command =
-      app.add_subcommand("compare", "Set runs or detectors on the same images side by side");
+  CLI::App* command = app.add_subcommand("compare", "Compare runs or detectors on the same images");
   command
       ->add_option("RUN", flags->runs,
-                   "Two or more, each a run folder or a CSV of query,match[,score], as PATH or "
+                   "Two or more run folders or CSV files of query,match[,score], each as PATH or "
                    "NAME=PATH")
       ->required()
       ->expected(2, 64);
-  CLI::Option* out = command->add_option("--out", flags->out, "Write one page that shows them all")
+  CLI::Option* out = command->add_option("--out", flags->out, "Write one page that shows all runs")
                          ->type_name("FILE");
-  command->add_flag("--open", flags->open, "Show the page in the browser")->needs(out);
+  command->add_flag("--open", flags->open, "Open the page in the browser")->needs(out);
   command->add_flag("--json", flags->json, "Print the table as JSON");
   add_report_flag(*command, flags->report);
   flags->truth.add_to(*command);

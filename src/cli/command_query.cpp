@@ -47,7 +47,7 @@ LoopDetectorOptions detector_options(const MapReader& map, const QueryFlags& fla
     const auto [name, value] = split_setting(setting);
     if (name.starts_with("binary_content.") || name.starts_with("surf.")) {
       throw Error(ErrorKind::option,
-                  fmt::format("{} is what '{}' was made with, and cannot be changed; make another "
+                  fmt::format("{} is fixed by '{}', which was made with it; make another "
                               "map with 'loopbit run --map'.",
                               name, flags.map));
     }
@@ -163,8 +163,7 @@ class Relocalizer {
 
 int query_command(const QueryFlags& flags) {
   if (flags.images.empty() == flags.watch.empty()) {
-    throw Error(ErrorKind::option,
-                "Which images? Name some, or a folder by --watch, but not both.");
+    throw Error(ErrorKind::option, "A query needs either images or --watch DIR; give one of them.");
   }
   Relocalizer relocalizer(flags);
   for (const std::string& image : flags.images) relocalizer.ask(image, image);
@@ -187,24 +186,24 @@ int query_command(const QueryFlags& flags) {
 void add_query(CLI::App& app, int& exit_code) {
   auto flags = std::make_shared<QueryFlags>();
   CLI::App* command =
-      app.add_subcommand("query", "Ask a map which of its places single images show");
-  command->add_option("MAP", flags->map, "A map that 'loopbit run --map' made")->required();
+      app.add_subcommand("query", "Find the places of a map that single images show");
+  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map'")->required();
   command->add_option("IMAGE", flags->images,
-                      "Images, or anything else that 'loopbit run' takes; each is asked about on "
-                      "its own");
+                      "Images, or anything else that 'loopbit run' accepts; each image is a "
+                      "separate query");
   command
       ->add_option("--watch", flags->watch,
-                   "Ask about each image in a folder, and about those to come, until Ctrl-C")
+                   "Query each image of a folder, and new ones as they arrive, until Ctrl-C")
       ->type_name("DIR");
-  command->add_option("--places", flags->places, "Show so many places an image, best first")
+  command->add_option("--places", flags->places, "Number of places to show per image, best first")
       ->type_name("N")
       ->capture_default_str()
       ->check(whole_number(1, 1000));
   command
       ->add_option("--place-images", flags->place_images,
-                   "A new folder for the images of the places shown, if the map keeps any")
+                   "A new folder for the images of the places shown, if the map has any")
       ->type_name("DIR");
-  command->add_flag("--json", flags->json, "Print a JSON object an image, one a line");
+  command->add_flag("--json", flags->json, "Print one JSON object per image, one per line");
   command
       ->add_option("--set", flags->settings,
                    "One setting of retrieval, verification or decision; may be repeated")

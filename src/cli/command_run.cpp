@@ -23,7 +23,7 @@ struct RunFlags {
 int run_command(const RunFlags& flags, const Arguments& arguments) {
   Session session;
   if (flags.session.out.empty() && flags.session.map.empty()) {
-    throw Error(ErrorKind::option, "Where to? Name a folder by --out, a map by --map, or both.");
+    throw Error(ErrorKind::option, "The run has no output; add --out DIR, --map MAP.db, or both.");
   }
   session.source = subsample(open_source(flags.input), static_cast<std::size_t>(flags.every),
                              static_cast<std::size_t>(flags.limit));
@@ -57,11 +57,10 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   command
       ->add_option(
           "--out", flags->session.out,
-          "Folder for loops.csv, run.json and report.html; with --map, MAP_session_N unless "
-          "given")
+          "Folder for loops.csv, run.json and report.html; default with --map: MAP_session_N")
       ->type_name("DIR");
   flags->session.add_to(*command);
-  command->add_option("--every", flags->every, "Read every N-th frame only")
+  command->add_option("--every", flags->every, "Read only every N-th frame")
       ->type_name("N")
       ->check(whole_number(1, 1'000'000));
   command->add_option("--limit", flags->limit, "Read at most N frames; 0 = all")

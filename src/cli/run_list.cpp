@@ -52,7 +52,7 @@ Json record_of(const FinishedRun& run) {
   if (run.record_json.empty()) return Json::object();
   Json record = Json::parse(run.record_json, nullptr, false);
   if (record.is_object()) return record;
-  throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is no record of a run: it was "
+  throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is not a record of a run: it was "
                                             "changed after loopbit wrote it; run again.",
                                             run.path));
 }
@@ -113,7 +113,7 @@ ReportRun scored_run(const std::string& text, const TruthFlags& flags) {
   ReportRun run = report_run(text, flags);
   if (!run.truth) {
     throw Error(ErrorKind::option,
-                fmt::format("'{}' says nothing about what is true; add --truth FILE.", text));
+                fmt::format("'{}' has no ground truth; add --truth FILE.", text));
   }
   return run;
 }

@@ -69,14 +69,12 @@ void SessionFlags::add_to(CLI::App& command) {
   command.add_flag("--overwrite", overwrite, "Replace an earlier run in the output folder");
   command
       .add_option("--map", map,
-                  "Continue this map, made if there is none: earlier sessions' places are "
-                  "recognised, too")
+                  "Continue this map, or create it. Places of earlier sessions are recognised")
       ->type_name("MAP.db");
-  command.add_flag("--keep-images", keep_images, "Keep a small JPEG of each place in the map")
+  command.add_flag("--keep-images", keep_images, "Store a small JPEG of each place in the map")
       ->needs("--map");
-  CLI::Option* named =
-      command.add_option("--preset", preset, "Named settings to begin with: default or paper")
-          ->type_name("NAME");
+  CLI::Option* named = command.add_option("--preset", preset, "Initial settings: default or paper")
+                           ->type_name("NAME");
   command.add_option("--config", config, "Settings file, JSON; see 'loopbit options --json'")
       ->type_name("FILE")
       ->excludes(named);
@@ -84,17 +82,18 @@ void SessionFlags::add_to(CLI::App& command) {
       .add_option("--set", settings, "One setting, such as surf.max_keypoints=500; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
-  command.add_option("--threads", threads, "Threads; 0 = one a core. Changes no result")
+  command
+      .add_option("--threads", threads, "Threads; 0 = one per core. Results do not depend on it")
       ->type_name("N")
       ->check(whole_number(0, 1024));
-  command.add_flag("--no-report", no_report, "Keep no pictures and write no report.html");
+  command.add_flag("--no-report", no_report, "Store no pictures and write no report.html");
   add_report_flag(command, report);
 }
 
 void add_report_flag(CLI::App& command, ReportOptions& options) {
   command
       .add_option("--pictures-mb", options.max_pictures_mb,
-                  "Pictures in the report take at most so many megabytes")
+                  "Largest total size of the pictures in the report, megabytes")
       ->type_name("MB")
       ->capture_default_str()
       ->check(number(0.0, 2000.0));

@@ -20,10 +20,10 @@ std::ptrdiff_t count(const std::vector<Detection>& detections, Status status) {
 void print_reasons(const std::vector<Detection>& detections) {
   constexpr std::pair<Status, const char*> kReasons[] = {
       {Status::no_earlier_place, "only recent places to compare with"},
-      {Status::no_similar_place, "no earlier place looks alike"},
+      {Status::no_similar_place, "no earlier place looks similar"},
       {Status::few_matches, "no candidate shares enough features"},
       {Status::no_geometry, "features match, but not as one rigid scene"},
-      {Status::low_score, "a geometry, but too little evidence"},
+      {Status::low_score, "geometry found, but too little evidence"},
       {Status::ambiguous, "enough evidence, but other places share it"},
       {Status::unreadable, "image unreadable"}};
   for (const auto& [status, meaning] : kReasons) {
@@ -43,7 +43,7 @@ void print_score(const DecisionCounts& score) {
 void print_times(const RunRecord& record, const std::vector<Detection>& detections) {
   const auto mean = [&](double StepTimes::*step) { return summarize(detections, step).mean; };
   fmt::print(
-      "speed      {:.1f} frames/s with {} thread{}; a frame's mean: content {:.2f} ms, "
+      "speed      {:.1f} frames/s with {} thread{}; mean per frame: content {:.2f} ms, "
       "retrieval {:.2f} ms, features {:.2f} ms, verification {:.2f} ms\n",
       static_cast<double>(detections.size()) / std::max(record.wall_s, 1e-9), record.threads,
       record.threads == 1 ? "" : "s", mean(&StepTimes::content_ms), mean(&StepTimes::retrieval_ms),

@@ -320,14 +320,14 @@ def test_bad_evaluations(run, dataset):
         loopbit.evaluate(run, protocol="kitti")
     with pytest.raises(loopbit.OptionError, match="as the path"):
         loopbit.evaluate(run, run.truth, protocol="ibow-lcd")
-    for setting, words in (({"poses": loopbit.PoseTruthOptions()}, "poses is about poses"),
-                           ({"views": 2}, "views is about a loop matrix"),
-                           ({"variable": "truth"}, "variable is about a loop matrix")):
+    for setting, words in (({"poses": loopbit.PoseTruthOptions()}, "poses applies to poses"),
+                           ({"views": 2}, "views applies to a loop matrix"),
+                           ({"variable": "truth"}, "variable applies to a loop matrix")):
         with pytest.raises(loopbit.OptionError, match=words):
             loopbit.read_truth(dataset / "truth.csv", **setting)
-    with pytest.raises(ValueError, match="defined on poses, but .* is a list of true places"):
+    with pytest.raises(ValueError, match="requires poses, but .* is a list of true places"):
         loopbit.evaluate(run, dataset / "truth.csv", protocol="kitti")
-    with pytest.raises(ValueError, match="what is true"):
+    with pytest.raises(ValueError, match="no ground truth"):
         loopbit.evaluate(loopbit.MatchList([1], [0]))
     with pytest.raises(ValueError, match="tolerance_frames is -1"):
         loopbit.evaluate(run, tolerance_frames=-1)
