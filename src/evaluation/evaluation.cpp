@@ -85,8 +85,8 @@ class Scorer {
     for (const ReportedMatch& match : list_.matches) {
       if (std::int64_t{match.query} * truth.every < truth.frames) continue;
       throw Error(ErrorKind::input,
-                  fmt::format("Query {} is beyond the {} frames that ground truth tells of: give "
-                              "that of this sequence, and which of its frames were read.",
+                  fmt::format("Query {} is beyond the {} frames of the ground truth; give the "
+                              "ground truth of this sequence, and say which frames were read.",
                               match.query, truth.frames));
     }
   }

@@ -60,7 +60,7 @@ int checked(std::int64_t frames, const std::string& name) {
   constexpr std::int64_t kMaxFrames = 2'000'000;
   if (frames <= kMaxFrames) return static_cast<int>(frames);
   throw Error(ErrorKind::input,
-              fmt::format("'{}' tells of {} frames, but a page shows at most {}; leave out frames, "
+              fmt::format("'{}' has {} frames, but a page shows at most {}; leave out frames, "
                           "or use 'loopbit eval', which needs none.",
                           name, frames, kMaxFrames));
 }
@@ -279,9 +279,10 @@ Json record_of(const ReportRun& run) {
   if (!run.run || run.run->record_json.empty()) return nullptr;
   Json record = Json::parse(run.run->record_json, nullptr, false);
   if (!record.is_object() || !record.contains("options")) {
-    throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is no record of a run: it was "
-                                              "changed after loopbit wrote it; run again.",
-                                              run.run->path));
+    throw Error(ErrorKind::input,
+                fmt::format("The run.json in '{}' is not a record of a run: it was "
+                            "changed after loopbit wrote it; run again.",
+                            run.run->path));
   }
   return record;
 }
