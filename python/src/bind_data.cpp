@@ -143,7 +143,7 @@ void bind_truth(py::module_& module) {
           "True earlier places.")
       .def_property_readonly(
           "near_place", [](const GroundTruth& self) { return take(self.near_place); },
-          "Matches that are neither right nor wrong.")
+          "Matches that are not wrong; they are right only if same_place has them, too.")
       .def_property_readonly(
           "ignored", [](const GroundTruth& self) -> py::array_t<int> { return take(self.ignored); },
           "Queries that are not scored.")

@@ -37,7 +37,7 @@ void TruthFlags::add_to(CLI::App& command) {
           ->type_name("FILE");
   command
       .add_option("--not-false", not_false,
-                  "Matches that are neither right nor wrong; CSV as above")
+                  "Matches that are not wrong, but right only if truth lists them; CSV as above")
       ->type_name("FILE")
       ->needs(option_truth);
   command.add_option("--ignore", ignore, "Queries that are not scored, one per line")
