@@ -41,7 +41,7 @@ namespace {
 
 namespace py = pybind11;
 
-/// Takes the lock of a detector while the GIL is free.
+/// Releases the GIL and locks a detector.
 struct FreeAndLocked {
   explicit FreeAndLocked(std::recursive_mutex& mutex) : lock(mutex) {}
 
@@ -124,7 +124,7 @@ void bind_ranked_place(py::module_& module) {
       });
 }
 
-/// SharedDetector::query, and where a list is given, its new contents.
+/// SharedDetector::query; fills the list if one is given.
 Detection query(const SharedDetector& detector, ImageArgument image,
                 std::optional<double> timestamp_s, std::optional<Ranking> ranking) {
   if (!ranking) return detector.query(std::move(image), timestamp_s, nullptr);
@@ -181,7 +181,7 @@ Detection SharedDetector::process(ImageArgument image, std::optional<double> tim
     const FreeAndLocked guard(mutex_);
     detection = detector_.process(pixels, timestamp_s, evidence ? &seen : nullptr);
   }
-  // With the GIL, for others may be reading it.
+  // With the GIL, because other threads may read it.
   if (evidence) *evidence = std::move(seen);
   return detection;
 }

@@ -14,8 +14,8 @@ namespace {
 
 namespace py = pybind11;
 
-// One for each ErrorKind. They live as long as the process: the interpreter may raise them until
-// its very end.
+// One type per ErrorKind. They live as long as the process, because the interpreter may raise them
+// until it ends.
 struct ErrorTypes {
   PyObject* option = nullptr;
   PyObject* input = nullptr;

@@ -22,7 +22,7 @@ namespace {
 
 namespace py = pybind11;
 
-/// Throws ValueError unless a column has one value a row.
+/// Throws ValueError unless a column has one value per row.
 void check_rows(std::size_t values, std::size_t rows, const char* name) {
   if (values == rows) return;
   throw py::value_error(

@@ -65,13 +65,13 @@ std::vector<LoopRow> loops_of(MapReader& map) {
   return rows;
 }
 
-/// What a method of a map without parameters returns.
+/// Calls a method of a map that has no parameters.
 template <auto method, typename Map>
 auto call(Map& map) {
   return map.exclusively([](auto& free) { return (free.*method)(); });
 }
 
-/// What `rows_of` collects, as an array; the GIL is free meanwhile.
+/// The rows of `rows_of` as an array. Releases the GIL while collecting them.
 template <typename Row>
 py::array array_of(SharedReader& map, std::vector<Row> (*rows_of)(MapReader&)) {
   std::vector<Row> rows;
@@ -82,7 +82,7 @@ py::array array_of(SharedReader& map, std::vector<Row> (*rows_of)(MapReader&)) {
   return take(std::move(rows));
 }
 
-/// Throws TypeError unless `row` is one of places().
+/// Throws TypeError unless `row` is a row of places().
 MapPlace place_of(const py::object& row) {
   try {
     const auto number = [&](const char* name) { return row[name].cast<std::int64_t>(); };

@@ -27,7 +27,7 @@ std::string class_name(std::string_view section) {
   return name + "Options";
 }
 
-/// The part of `options` called `name`, as a reference into it, or null.
+/// The section `name` of `options`, as a reference into it, or null.
 py::object section_of(const py::object& options, std::string_view name) {
   py::object found;
   for_each_section(options.cast<LoopDetectorOptions&>(), [&](std::string_view section, auto& part) {

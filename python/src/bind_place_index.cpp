@@ -26,7 +26,7 @@ void bind_place_index(py::module_& module) {
       module, "PlaceIndex",
       "Stores the binary contents of all places, and finds those most similar to a query.")
       .def(py::init<>())
-      // The GIL is kept: it lets one thread add at a time, which is what the index allows.
+      // Keeps the GIL, so that only one thread adds at a time, as the index requires.
       .def("add", &PlaceIndex::add, py::arg("content"), "Adds a place and returns its number.")
       .def("__len__", &PlaceIndex::size)
       .def(

@@ -26,7 +26,7 @@
 namespace loopbit::python {
 namespace {
 
-/// A function of Python's that is told one thing, or None.
+/// A Python callback with one argument, or None.
 template <typename Told>
 class Callback : public pybind11::object {
  public:
@@ -61,7 +61,7 @@ using OnBadFrame = Callback<Text>;
 using PositionRows = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Free = py::call_guard<WithoutGil>;
 
-/// What Python is told between two frames.
+/// The callbacks between two frames.
 template <typename Told>
 void tell(const Callback<Told>& callback, const Told& told) {
   const WithGil acquire;
@@ -123,7 +123,7 @@ void keep_positions(RecordedRun& recorded, const PositionRows& positions_m) {
   recorded.keep_positions(rows);
 }
 
-/// For the package's run_folder(), as loopbit run uses RecordedRun.
+/// For run_folder() of the package, which uses RecordedRun like the command.
 void bind_recorded_run(py::module_& module) {
   py::class_<RecordedRun>(module, "_RecordedRun")
       .def(py::init([](SharedSource& source, const Path& out, const LoopDetectorOptions& options,

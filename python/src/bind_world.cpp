@@ -22,7 +22,7 @@ namespace py = pybind11;
 
 using Free = py::call_guard<WithoutGil>;
 
-/// Throws Error unless `world` has that frame.
+/// Throws Error if `world` does not have the frame.
 void check_frame(const World& world, int frame) {
   if (frame >= 0 && frame < world.options().frames) return;
   throw Error(ErrorKind::option, fmt::format("frame is {}, but must be between 0 and {}.", frame,

@@ -11,11 +11,11 @@
 PYBIND11_MODULE(_loopbit, module) {
   namespace python = loopbit::python;
   module.doc() = "The compiled part of loopbit; import loopbit instead.";
-  // What it defines belongs to the package, for who reads a signature or a pickle.
+  // Types belong to the package, so that signatures and pickles name it.
   const pybind11::object own_name = module.attr("__name__");
   module.attr("__name__") = "loopbit";
   module.attr("__version__") = loopbit::kVersion;
-  // Bad images are reported by loopbit, in its own words.
+  // loopbit reports bad images itself.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   python::bind_errors(module);
   module.def(

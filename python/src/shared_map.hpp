@@ -14,15 +14,15 @@
 
 namespace loopbit::python {
 
-/// A map that several Python threads and one detector may hold: one at a time uses it. All but the
-/// constructor and path() must be called without the GIL: see SharedDetector.
+/// A map that several Python threads and one detector may share. It serves one at a time. Call all
+/// functions but the constructor and path() without the GIL; see SharedDetector.
 class SharedMap : public MapStorage {
  public:
   explicit SharedMap(std::string path) : path_(std::move(path)) {}
 
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// What a detector of the map must be given; nothing if the map does not say.
+  /// The options that a detector of the map needs; none if the map has no options.
   [[nodiscard]] virtual std::optional<LoopDetectorOptions> options() const = 0;
 
   void check_options(const LoopDetectorOptions& options) final;
@@ -49,7 +49,7 @@ class SharedReader : public SharedMap {
 
   [[nodiscard]] std::optional<LoopDetectorOptions> options() const override;
 
-  /// Calls use(reader) while nobody else may, and returns what it returns.
+  /// Calls use(reader) exclusively and returns its result.
   template <typename Use>
   auto exclusively(Use&& use) {
     const auto guard = lock();
