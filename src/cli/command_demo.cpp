@@ -88,7 +88,7 @@ int demo_command(const DemoFlags& flags, const Arguments& arguments) {
   session.arguments = arguments;
   session.truth_files = flags.truth.files();
   session.truth_description =
-      flags.truth.given() ? flags.truth.description() : "exact: the world is built in";
+      flags.truth.given() ? flags.truth.description() : "exact (built-in world)";
   session.evaluation = flags.truth.evaluation();
   session.truth = [&](const FrameTimes& times_s) {
     const GroundTruth built_in{.same_place = world->same_place(),
