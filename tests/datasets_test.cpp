@@ -302,7 +302,7 @@ TEST_F(Datasets, EurocNamesTheMalformedRow) {
                       {file, "line 3", "'" + row + "'", "timestamp_ns,filename", "correct"});
   }
   write("mav0/cam0/data.csv", "#timestamp [ns],filename\n");
-  expect_open_error(path(), ErrorKind::input, {file, "names no image"});
+  expect_open_error(path(), ErrorKind::input, {file, "lists no image"});
 }
 
 TEST_F(Datasets, FolderWithSomeDataCsvIsNoEuroc) {
@@ -366,7 +366,7 @@ TEST_F(Datasets, ListNamesTheMalformedRow) {
   write("list.TXT", "a.png\nb.doc\n");
   expect_open_error(path("list.TXT"), ErrorKind::input, {path("list.TXT"), "line 2", "'b.doc'"});
   write("empty.txt", "# nothing\n\n");
-  expect_open_error(path("empty.txt"), ErrorKind::input, {path("empty.txt"), "names no image"});
+  expect_open_error(path("empty.txt"), ErrorKind::input, {path("empty.txt"), "lists no image"});
 }
 
 TEST_F(Datasets, LongOrBinaryRowsAreCutInMessages) {

@@ -278,9 +278,9 @@ TEST_F(TruthFileTest, RefusesWhatIsNoMatrixOfRealNumbers) {
   expect_input_error(file, {"no square matrix", "m (3 x 3)"});
   TruthOptions options;
   options.variable = "m";
-  expect_input_error(file, {"'m'", "no matrix of real numbers"}, options);
+  expect_input_error(file, {"'m'", "not a matrix of real numbers"}, options);
   MatWriter(file).add_square<double>("m", {}, MAT_F_COMPLEX);
-  expect_input_error(file, {"'m'", "no matrix of real numbers"});
+  expect_input_error(file, {"'m'", "not a matrix of real numbers"});
   MatWriter(file).add<double>("m", {kSide, kSide}, dense<double>({kSide, {{4, 2}}}, kNan));
   expect_input_error(file, {"'m'", "row 5, column 3"});
   MatWriter(file).add_sparse("m", {kSide, {{4, 2}}}, kNan);

@@ -80,7 +80,7 @@ ImageList list_images(const fs::path& folder, std::string description) {
 
 [[noreturn]] void throw_no_rows(const fs::path& file) {
   throw Error(ErrorKind::input,
-              fmt::format("'{}' names no image: give it one line an image.", file.string()));
+              fmt::format("'{}' lists no image: write one image per line.", file.string()));
 }
 
 std::vector<double> read_times(const fs::path& file) {

@@ -48,7 +48,7 @@ std::shared_ptr<MapWriter> open_map(RunRecord& record, bool keep_images) {
 std::string folder_of(const RunRecord& record, const std::string& out) {
   if (!out.empty()) return out;
   if (record.map_path.empty()) {
-    throw Error(ErrorKind::option, "Nothing says where to keep the run; name a folder or a map.");
+    throw Error(ErrorKind::option, "The run has no output; give a folder or a map.");
   }
   const auto stem = std::filesystem::path(record.map_path).replace_extension().string();
   return fmt::format("{}_session_{}", stem, record.map_session);

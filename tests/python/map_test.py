@@ -335,7 +335,7 @@ def test_run_folder_continues_a_map_as_the_command(commanded, laps, tmp_path):
     assert json.loads(run.record_json)["map"] == {"path": str(path), "session": 2}
     ours, theirs = (loopbit.MapReader(map).places().tobytes() for map in (path, commanded))
     assert ours == theirs
-    with pytest.raises(loopbit.OptionError, match="where to keep the run"):
+    with pytest.raises(loopbit.OptionError, match="The run has no output"):
         loopbit.run_folder(laps[0])
 
 
