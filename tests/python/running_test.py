@@ -233,7 +233,7 @@ def test_files_do_not_count_from_the_middle(dataset, tmp_path, take, arguments, 
     for _ in range(10):
         take(source)
     paths = {name: dataset / file for name, file in arguments.items()}
-    with pytest.raises(loopbit.OptionError, match=f"{words}.* 10 .* were taken.*open it anew"):
+    with pytest.raises(loopbit.OptionError, match=f"{words}.* 10 .* already read; open it again"):
         loopbit.run_folder(source, tmp_path / "run", **paths)
     assert not any(tmp_path.iterdir())
     run = loopbit.run_folder(source, tmp_path / "run", truth=loopbit.GroundTruth([[2, 0]]),
