@@ -306,7 +306,8 @@ class MapCommandTest(CommandTest):
     def test_merge_compact_and_check(self):
         merged = self.scratch / "merged.db"
         self.assertIn("2 sessions", loopbit("map", "merge", merged, self.map).stdout)
-        self.assertIn("2 sessions were already there", loopbit("map", "merge", merged, self.map).stdout)
+        self.assertIn("2 sessions were already there",
+                      loopbit("map", "merge", merged, self.map).stdout)
         self.assertIn(f"{FRAMES} places", loopbit("map", "check", merged).stdout)
         self.assertIn(f"20 of {FRAMES} kept",
                       loopbit("map", "compact", merged, "--budget", 20).stdout)
