@@ -153,8 +153,10 @@ void bind_reader(py::module_& module) {
       module, "MapReader",
       "A map on disk, to be read, also while it is being written: a reader sees what was committed "
       "when it looked. What is damaged is left out, never guessed.")
-      .def(py::init<const std::filesystem::path&>(), py::arg("path"), Free(),
-           "Raises InputError if there is no map, or one that cannot be read.")
+      .def(py::init<const std::filesystem::path&, std::size_t>(), py::arg("path"),
+           py::arg("cache_mb") = kMapCache_mb, Free(),
+           "Raises InputError if there is no map, or one that cannot be read. cache_mb: keep up to "
+           "this many MiB of features in memory.")
       .def_property_readonly("sessions",
                              py::cpp_function(&call<&MapReader::sessions, SharedReader>, Free()),
                              "Those that were there when it was opened, in order.")
@@ -196,15 +198,18 @@ void bind_writer(py::module_& module) {
       "statement, finish() is called at its end.")
       .def(
           py::init([](const std::filesystem::path& path, const LoopDetectorOptions& options,
-                      const std::filesystem::path& name, bool keep_images) {
-            return std::make_shared<SharedWriter>(path, options, name.string(), keep_images);
+                      const std::filesystem::path& name, bool keep_images, std::size_t cache_mb) {
+            return std::make_shared<SharedWriter>(path, options, name.string(), keep_images,
+                                                  cache_mb);
           }),
           py::arg("path"), py::arg("options"), py::arg("name"), py::arg("keep_images") = false,
-          Free(),
+          py::arg("cache_mb") = kMapCache_mb, Free(),
           "Creates or continues a map; the name says what the session reads. Raises OutputError if "
           "it has a writer or cannot be written, OptionError if it was made with other settings of "
-          "binary_content or surf. keep_images: a small JPEG of each place, too. A session without "
-          "frames leaves no trace.")
+          "binary_content or surf. keep_images: a small JPEG of each place, too. cache_mb: keep up "
+          "to "
+          "this many MiB of features in memory. A session without frames leaves no trace. A forked "
+          "child cannot use it: OptionError.")
       .def_property_readonly("session",
                              py::cpp_function(&call<&MapWriter::session, SharedWriter>, Free()),
                              "The number of the session that is written.")
