@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Truth and scores: the rules of the command's --truth flags, for files and for values."""
+"""Ground truth and scores, with the rules of the command's --truth flags."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def read_truth(
     every: int = 1,
     times_s: Times = (),
 ) -> GroundTruth:
-    """What is true about a sequence, by a file: rows of query,first,last or query,match; KITTI
-    poses, a TUM trajectory or EuRoC states, which need the frames' times; a loop matrix as .mat,
-    text or image.
+    """Reads a file of ground truth: rows of query,first,last or query,match; KITTI poses, a TUM
+    trajectory or EuRoC states; a loop matrix as .mat, text or image.
 
-    A protocol fixes poses and views, which then must not be given. not_false and ignore are files
-    of matches that are not wrong, and of queries that are not scored. All files count the frames of
-    the whole sequence, of which every so-many-th was read, at times_s.
+    poses, views and variable apply to poses and matrices; a protocol fixes poses and views.
+    not_false is a file of matches that are not wrong, ignore a file of queries that are not scored.
+    All files count the frames of the whole sequence; every means that only every N-th of them was
+    read. times_s has the times of the frames read, which trajectories with times need.
     """
     kind = _loopbit.truth_kind(path)
     settings = PoseTruthOptions() if poses is None else poses
@@ -82,7 +82,7 @@ def read_truth(
 
 
 def check_kind(protocol: str, path: Path) -> None:
-    """Raises OptionError unless the protocol is defined on what the file is."""
+    """Raises OptionError if the protocol requires another kind of truth than the file has."""
     named, kind = _loopbit.find_protocol(protocol), _loopbit.truth_kind(path)
     if named.truth_kind != kind:
         raise _loopbit.OptionError(
@@ -92,7 +92,7 @@ def check_kind(protocol: str, path: Path) -> None:
 
 
 def check_value(protocol: str) -> None:
-    """Raises OptionError if there is a protocol, for truth that does not say what it is by."""
+    """Raises OptionError if there is a protocol, because truth as a value has no known kind."""
     if protocol:
         kind = _loopbit.find_protocol(protocol).truth_kind
         raise _loopbit.OptionError(
@@ -116,12 +116,12 @@ def evaluate(
     protocol: str = "",
     tolerance_frames: int | None = None,
 ) -> Evaluation:
-    """Scores what a detector, any detector, found.
+    """Scores the loops of any detector.
 
-    found: a run, a list of matches, detections, or the path of a run folder or of a CSV of
-    query,match[,score]. truth: as read_truth() gives it, for the frames that were read, or its
-    path; a run that was given a truth needs none, and is scored as it was then. A protocol fixes
-    the tolerance, which then must not be given, and needs the truth's path.
+    found is a run, a MatchList, detections, or the path of a run folder or of a CSV file of
+    query,match[,score]. truth is a GroundTruth for the frames that were read, or the path of a
+    file. Without truth, a run is scored by the truth and the protocol that it was given. A protocol
+    fixes the tolerance and requires the path of a truth file.
     """
     if isinstance(found, (str, os.PathLike)) and os.path.isdir(found):
         found = _loopbit.read_run(found)
@@ -153,18 +153,18 @@ def evaluate(
 
 
 def recorded_scoring(run: FinishedRun) -> tuple[int, str]:
-    """The tolerance and the protocol that the run was scored with when it ended."""
+    """The tolerance and the protocol with which the run was scored at its end."""
     return _value_at(run, "score", "tolerance_frames", 0), _value_at(run, "score", "protocol", "")
 
 
 def _every(run: FinishedRun) -> int:
-    """Of the frames that files of truth count, every so-many-th was read."""
+    """The N of "every N-th frame was read", in frames of the truth file."""
     every, views = (max(1, _value_at(run, "input", name, 1)) for name in ("every", "views"))
     return max(1, every // views)
 
 
 def _value_at(run: FinishedRun, part: str, name: str, otherwise: _Value) -> _Value:
-    """What stands there in run.json; `otherwise` where nothing of that type does."""
+    """A value of run.json; `otherwise` if it is missing or has another type."""
     found = _record(run).get(part)
     value = found.get(name) if isinstance(found, dict) else None
     return value if isinstance(value, type(otherwise)) else otherwise

@@ -167,25 +167,25 @@ std::map<PlaceId, BinaryContent> contents_of(const FinishedRun& run) {
 }
 
 void bind_finished_run(py::module_& module) {
-  py::class_<FinishedRun>(module, "FinishedRun", "What a run left in its folder.")
+  py::class_<FinishedRun>(module, "FinishedRun", "The folder of a run.")
       .def_property_readonly("path", text_of(&FinishedRun::path))
-      .def_readonly("detections", &FinishedRun::detections, "A Detection a frame.")
-      .def_readonly("truth", &FinishedRun::truth, "As it was given to the run, or None.")
+      .def_readonly("detections", &FinishedRun::detections, "One Detection per frame.")
+      .def_readonly("truth", &FinishedRun::truth,
+                    "The ground truth that the run was given, or None.")
       .def_readonly(
           "record_json", &FinishedRun::record_json,
-          "run.json; empty where there is none. Its stopped_by is 'running' until the run ends.")
+          "The text of run.json, or empty. Its stopped_by is 'running' until the run ends.")
       .def_property_readonly(
           "positions_m", [](const FinishedRun& self) { return to_array(self.positions_m); },
-          "Camera centres, shape (n, 3), nan where not known; n is 0 where the "
-          "run had no poses.")
+          "Camera centres, shape (n, 3), nan if unknown; n is 0 if the run had no poses.")
       .def("contents", &contents_of, Free(),
-           "The binary content of each readable frame, by its number; none without evidence.")
+           "The binary content of each readable frame, by frame number; empty without evidence.")
       .def("__repr__", [](const FinishedRun& self) {
         return Text{fmt::format("FinishedRun('{}', {} frames)", self.path, self.detections.size())};
       });
   module.def(
       "read_run", [](const Path& path) { return read_run(path.string()); }, py::arg("path"), Free(),
-      "Reads a run folder, also one whose run was cut off.");
+      "Reads a run folder, also of an interrupted run.");
 }
 
 }  // namespace
@@ -193,7 +193,7 @@ void bind_finished_run(py::module_& module) {
 void bind_run(py::module_& module) {
   bind_finished_run(module);
   module.def("match_list", &match_list, py::arg("detections"), Free(),
-             "What detections say, as any detector's list would.");
+             "Converts detections to a MatchList.");
   module.def("_run", &run_source, py::arg("source"), py::arg("detector"), py::arg("on_detection"),
              py::arg("on_bad_frame"));
   bind_recorded_run(module);

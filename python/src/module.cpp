@@ -20,7 +20,7 @@ PYBIND11_MODULE(_loopbit, module) {
   python::bind_errors(module);
   module.def(
       "active_kernel", [] { return std::string(loopbit::active_kernels().name); },
-      "The instruction set whose inner loops run: scalar, avx2, avx512 or, on Arm, dotprod; "
+      "The instruction set of the kernels: scalar, avx2, avx512 or, on Arm, dotprod. "
       "LOOPBIT_KERNEL forces one.");
   python::bind_options(module);
   python::bind_content(module);
