@@ -165,10 +165,11 @@ class MapWriter::Impl {
   /// Throws Error (kind option) in a forked child.
   void check_process() const {
     if (!is_forked()) return;
-    throw Error(ErrorKind::option,
-                fmt::format("The writer of '{}' belongs to process {}, from which this one was "
-                            "forked: write the map there, or fork before it is opened.",
-                            path_, process_));
+    throw Error(
+        ErrorKind::option,
+        fmt::format("The MapWriter of '{}' belongs to process {}, which forked this one. Use "
+                    "it there, or fork before you open the map.",
+                    path_, process_));
   }
 
   void check_options(const LoopDetectorOptions& options) {

@@ -148,16 +148,16 @@ std::string log_fault(const Database& database) {
     const std::string reason = has_log ? other_name(path) : "";
     if (reason.empty()) return "";
     return fmt::format(
-        "'{}' is being written under another name, or was and its run was killed: what was saved "
-        "last lies in a log beside that name. Open it by that name. (It {}.)",
+        "The latest data of '{0}' is in a log beside another name of the file: a run writes it "
+        "under that name, or was killed. Open the map by that name. ('{0}' {1}.)",
         path, reason);
   }
   const bool is_own =
       has_log && log.page_bytes == page_bytes_of(header) && log.mark == mark_at(header);
   if (is_own) return "";
   return fmt::format(
-      "'{}' is the log of another map, or of another copy of this one, not of '{}': nothing was "
-      "read or written. Move it to where it belongs, then try again.",
+      "'{}' is the log of another map or of another copy of '{}'. Nothing was read or written. "
+      "Move the log away, then try again.",
       log_path, path);
 }
 
@@ -170,13 +170,13 @@ std::string header_fault(const Database& database) {
   // Shorter files have none; SQLite refuses those that it cannot read.
   if (header[0] == 0 || (write == read && (read == kWithoutLog || read == kWithLog))) return "";
   return fmt::format(
-      "the file: its header says that it is written as version {} and read as version {} of "
-      "SQLite's format, not both as {} or {}",
+      "the file: its header gives SQLite's write version as {} and its read version as {}; both "
+      "must be {}, or both {}",
       write, read, kWithoutLog, kWithLog);
 }
 
 void check_log(const Database& database) {
-  // What a writer does meanwhile may look wrong for a moment.
+  // A writer that begins or ends its log may look wrong for a moment.
   constexpr int kAttempts = 5;
   constexpr std::chrono::milliseconds kPause{20};
   std::string fault;

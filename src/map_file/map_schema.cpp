@@ -149,9 +149,8 @@ Database lock_map(const std::string& path) {
 void check_may_be_written(const std::string& path) {
   if (const std::string reason = other_name(path); !reason.empty()) {
     throw Error(ErrorKind::output,
-                fmt::format("'{}' {}: the log of what is written lies beside one name only, and "
-                            "would be missed by the others. Copy the map to a file of its own, or "
-                            "mount its folder, and use that.",
+                fmt::format("'{}' {}, and the log of a run would be beside one name only. Copy the "
+                            "map to a file of its own, or mount its folder, and use that.",
                             path, reason));
   }
   const auto folder = std::filesystem::path(resolved_path(path)).parent_path();
