@@ -87,7 +87,7 @@ class MapCommandTest(CommandTest):
         town.write_bytes(bytes_)
         checked = loopbit("map", "check", town)
         self.assertEqual(checked.returncode, 3, checked.stdout)
-        self.assertIn("damaged    the file: its header says", checked.stdout)
+        self.assertIn("damaged    the file: its header gives", checked.stdout)
         run = loopbit("run", self.laps[0], "--map", town, "--out", self.scratch / "out")
         self.assert_fails(run, 3, "is damaged", "--recover")
         self.assert_fails(loopbit("map", "merge", town, self.map), 3, "is damaged", "--recover")

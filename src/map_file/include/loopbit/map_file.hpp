@@ -60,10 +60,9 @@ struct MapImages {
 /// Makes the bytes of a small JPEG file of an image; see picture_jpeg.hpp.
 using EncodeImage = std::function<std::vector<unsigned char>(const cv::Mat&)>;
 
-/// Features that were used last stay in memory, up to so many MiB unless a map is opened with
-/// another number. It changes no result, only how often features are read from the file again. 64
-/// MiB hold some 1,400 places, more than a robot passes in the minutes that a revisit lasts, and
-/// are a small part of its memory.
+/// Recently used features stay in memory, up to this many MiB by default. The cache changes no
+/// result, only how often features are read from the file again. 64 MiB hold about 1,400 places, or
+/// minutes of driving, and are a small part of a robot's memory.
 inline constexpr std::size_t kMapCache_mb = 64;
 
 /// A map on disk, to be read, also while it is being written: a reader sees what was committed when
@@ -130,8 +129,8 @@ class MapReader : public MapStorage {
 ///
 /// Frames are handed to a thread that commits them in batches of 32 or, at the latest, after a
 /// second; what is committed survives SIGKILL and the loss of power. add() waits only where that
-/// thread is 256 frames behind. A forked child cannot use it: what it calls throws Error (kind
-/// option).
+/// thread is 256 frames behind. In a forked child every call throws Error
+/// (kind option).
 class MapWriter : public MapStorage {
  public:
   /// Creates or continues the map at `path`; `name` says what the session reads. Throws Error
@@ -151,7 +150,7 @@ class MapWriter : public MapStorage {
   MapWriter(MapWriter&&) = delete;
   MapWriter& operator=(MapWriter&&) = delete;
 
-  /// Throws Error (kind option) in a forked child, and waits for nobody.
+  /// Throws Error (kind option) in a forked child. Never waits.
   void check_process() const;
 
   /// The number of the session that is written.
