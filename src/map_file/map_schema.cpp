@@ -177,8 +177,9 @@ Database open_map_for_writing(const std::string& path, int version) {
   database.execute(fmt::format("PRAGMA page_size = {}; PRAGMA synchronous = EXTRA", kMapPageBytes));
   const int found = checked_version(database);
   if (found > 0) check_tables(database, found);
-  close_log(database);                            // of a run that was killed
-  database.execute("BEGIN IMMEDIATE; ROLLBACK");  // throws where nothing can be written
+  close_log(database);  // of a run that was killed
+  // Throws if nothing can be written, or if a long read would keep the log from beginning.
+  database.execute("BEGIN EXCLUSIVE; ROLLBACK");
   if (found == 0) migrate(database, found, version);
   return database;
 }
