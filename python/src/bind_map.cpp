@@ -155,8 +155,11 @@ void bind_reader(py::module_& module) {
       module, "MapReader",
       "Reads a map, also while it is being written. Each read sees what is committed at that time. "
       "Damaged rows are left out.")
-      .def(py::init<const std::filesystem::path&>(), py::arg("path"), Free(),
-           "Raises InputError if the map is missing or cannot be read.")
+      .def(
+          py::init<const std::filesystem::path&, std::size_t>(), py::arg("path"),
+          py::arg("cache_mb") = kMapCache_mb, Free(),
+          "Raises InputError if the map is missing or cannot be read. cache_mb limits the features "
+          "kept in memory, in MiB.")
       .def_property_readonly("sessions",
                              py::cpp_function(&call<&MapReader::sessions, SharedReader>, Free()),
                              "The sessions that existed when the map was opened, in order.")
@@ -193,17 +196,21 @@ void bind_writer(py::module_& module) {
   py::class_<SharedWriter, SharedMap, std::shared_ptr<SharedWriter>>(
       module, "MapWriter",
       "Writes a new session of a LoopDetector to a map. A map has one writer. Frames are committed "
-      "in batches of 32, or after one second. The with statement calls finish() at its end.")
-      .def(py::init([](const std::filesystem::path& path, const LoopDetectorOptions& options,
-                       const std::filesystem::path& name, bool keep_images) {
-             return std::make_shared<SharedWriter>(path, options, name.string(), keep_images);
-           }),
-           py::arg("path"), py::arg("options"), py::arg("name"), py::arg("keep_images") = false,
-           Free(),
-           "Creates or continues a map. name describes the input of the session. keep_images also "
-           "stores a small JPEG of each place. A session without frames is not stored. Raises "
-           "OutputError if the map has a writer or cannot be written, and OptionError if it was "
-           "made with other settings of binary_content or surf.")
+      "in batches of 32, or after one second. The with statement calls finish() at its end. In a "
+      "forked child, every use raises OptionError.")
+      .def(
+          py::init([](const std::filesystem::path& path, const LoopDetectorOptions& options,
+                      const std::filesystem::path& name, bool keep_images, std::size_t cache_mb) {
+            return std::make_shared<SharedWriter>(path, options, name.string(), keep_images,
+                                                  cache_mb);
+          }),
+          py::arg("path"), py::arg("options"), py::arg("name"), py::arg("keep_images") = false,
+          py::arg("cache_mb") = kMapCache_mb, Free(),
+          "Creates or continues a map. name describes the input of the session. keep_images also "
+          "stores a small JPEG of each place. cache_mb limits the features kept in memory, in MiB. "
+          "A session without frames is not stored. Raises OutputError if the map has a writer or "
+          "cannot be written, and OptionError if it was made with other settings of "
+          "binary_content or surf.")
       .def_property_readonly("session",
                              py::cpp_function(&call<&MapWriter::session, SharedWriter>, Free()),
                              "Number of the session that is being written.")

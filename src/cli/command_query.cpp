@@ -21,6 +21,7 @@
 #include "map_damage.hpp"
 #include "place_images.hpp"
 #include "ranges.hpp"
+#include "session.hpp"
 #include "stop_signal.hpp"
 #include "streams.hpp"
 
@@ -37,6 +38,7 @@ struct QueryFlags {
   std::string watch;
   std::size_t places = 3;
   std::string place_images;
+  std::size_t map_cache_mb = kMapCache_mb;
   std::vector<std::string> settings;
   bool json = false;
 };
@@ -104,7 +106,7 @@ class Relocalizer {
  public:
   explicit Relocalizer(const QueryFlags& flags)
       : flags_(flags),
-        map_(std::make_shared<MapReader>(flags.map)),
+        map_(std::make_shared<MapReader>(flags.map, flags.map_cache_mb)),
         detector_(detector_options(*map_, flags), map_) {
     if (!flags.place_images.empty()) place_images_.emplace(*map_, flags.place_images);
     if (!flags.json) {
@@ -203,6 +205,7 @@ void add_query(CLI::App& app, int& exit_code) {
       ->add_option("--place-images", flags->place_images,
                    "A new folder for the images of the places shown, if the map has any")
       ->type_name("DIR");
+  add_map_cache_flag(*command, flags->map_cache_mb);
   command->add_flag("--json", flags->json, "Print one JSON object per image, one per line");
   command
       ->add_option("--set", flags->settings,

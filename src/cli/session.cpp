@@ -73,6 +73,7 @@ void SessionFlags::add_to(CLI::App& command) {
       ->type_name("MAP.db");
   command.add_flag("--keep-images", keep_images, "Store a small JPEG of each place in the map")
       ->needs("--map");
+  add_map_cache_flag(command, map_cache_mb);
   CLI::Option* named = command.add_option("--preset", preset, "Initial settings: default or paper")
                            ->type_name("NAME");
   command.add_option("--config", config, "Settings file, JSON; see 'loopbit options --json'")
@@ -88,6 +89,15 @@ void SessionFlags::add_to(CLI::App& command) {
       ->check(whole_number(0, 1024));
   command.add_flag("--no-report", no_report, "Store no pictures and write no report.html");
   add_report_flag(command, report);
+}
+
+void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb) {
+  command
+      .add_option("--map-cache-mb", cache_mb,
+                  "Keep up to this many MiB of the map's features in memory. Changes no result")
+      ->type_name("MB")
+      ->capture_default_str()
+      ->check(whole_number(0, 1'000'000));
 }
 
 void add_report_flag(CLI::App& command, ReportOptions& options) {
@@ -130,7 +140,11 @@ int run_session(Session session, const SessionFlags& flags) {
                         .map_path = flags.map,
                         .arguments = session.arguments,
                         .truth = session.truth_description},
-                       {flags.out, flags.overwrite, flags.keep_images, inputs});
+                       {.folder = flags.out,
+                        .overwrite = flags.overwrite,
+                        .keep_images = flags.keep_images,
+                        .map_cache_mb = flags.map_cache_mb,
+                        .inputs = inputs});
   cv::setNumThreads(std::min(threads, thread_count(0)));  // TBB warns of more
   if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
   try {

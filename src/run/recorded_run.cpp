@@ -37,10 +37,11 @@ class Stopwatch {
 };
 
 /// Null if `record` names no map; else record.map_session is set.
-std::shared_ptr<MapWriter> open_map(RunRecord& record, bool keep_images) {
+std::shared_ptr<MapWriter> open_map(RunRecord& record, const RunOutput& out) {
   if (record.map_path.empty()) return nullptr;
-  auto map = std::make_shared<MapWriter>(record.map_path, record.options, record.input,
-                                         keep_images ? picture_jpeg : EncodeImage{});
+  auto map =
+      std::make_shared<MapWriter>(record.map_path, record.options, record.input,
+                                  out.keep_images ? picture_jpeg : EncodeImage{}, out.map_cache_mb);
   record.map_session = map->session();
   return map;
 }
@@ -85,7 +86,7 @@ RunFolder make_folder(const RunRecord& record, const RunOutput& out) {
 
 RecordedRun::RecordedRun(RunRecord record, const RunOutput& out)
     : record_(std::move(record)),
-      map_(open_map(record_, out.keep_images)),
+      map_(open_map(record_, out)),
       detector_(std::in_place, record_.options, map_),
       folder_(make_folder(record_, out)) {
   record_.stopped_by = kRunning;

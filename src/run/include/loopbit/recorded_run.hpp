@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -24,7 +25,8 @@ namespace loopbit {
 struct RunOutput {
   std::string folder;      ///< empty = beside the map, "town_session_2" for session 2 of "town.db"
   bool overwrite = false;  ///< an earlier run in the folder
-  bool keep_images = false;              ///< a small picture of each place in the map
+  bool keep_images = false;  ///< a small picture of each place in the map
+  std::size_t map_cache_mb = kMapCache_mb;
   std::vector<std::string> inputs = {};  ///< input files, which are never replaced
 };
 
