@@ -21,6 +21,7 @@
 #include "map_damage.hpp"
 #include "place_images.hpp"
 #include "ranges.hpp"
+#include "session.hpp"
 #include "stop_signal.hpp"
 #include "streams.hpp"
 
@@ -38,6 +39,7 @@ struct QueryFlags {
   std::size_t places = 3;
   std::string place_images;
   std::vector<std::string> settings;
+  int max_megapixels = kMaxMegapixels;
   bool json = false;
 };
 
@@ -117,11 +119,14 @@ class Relocalizer {
   /// called in it.
   void ask(const std::string& input, const std::string& name) {
     try {
-      const auto source = open_source(input);
+      const auto source = open_source(input, flags_.max_megapixels);
       const std::string own_name = fs::path(input).filename().string();
       for (Frame frame; source->next(frame);) {
         frame.name = frame.name == own_name ? name : (fs::path(name) / frame.name).string();
         answer(frame);
+      }
+      if (const std::string why = source->early_end(); !why.empty()) {
+        tell(fmt::format("loopbit: {}\n", why));
       }
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;
@@ -204,6 +209,7 @@ void add_query(CLI::App& app, int& exit_code) {
       ->add_option("--place-images", flags->place_images,
                    "A new folder for the images of the places shown, if the map keeps any")
       ->type_name("DIR");
+  add_image_flag(*command, flags->max_megapixels);
   command->add_flag("--json", flags->json, "Print a JSON object an image, one a line");
   command
       ->add_option("--set", flags->settings,

@@ -100,6 +100,13 @@ void add_report_flag(CLI::App& command, ReportOptions& options) {
       ->check(number(0.0, 2000.0));
 }
 
+void add_image_flag(CLI::App& command, int& max_megapixels) {
+  command.add_option("--max-megapixels", max_megapixels, "Larger images are unreadable")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(whole_number(1, 1'000'000));
+}
+
 LoopDetectorOptions SessionFlags::detector_options() const {
   LoopDetectorOptions options = config.empty() ? loopbit::preset(preset) : load_options(config);
   for (const std::string& setting : settings) {
@@ -137,6 +144,9 @@ int run_session(Session session, const SessionFlags& flags) {
   try {
     drive(*session.source, recorded, !flags.no_report, stop_requested);
     warn_of_damage(flags.map, recorded.map_damage());
+    if (const auto& why = recorded.record().early_end; !why.empty()) {
+      tell(fmt::format("loopbit: {}\n", why));
+    }
   } catch (const Error& error) {
     try {
       recorded.finish(error.what());

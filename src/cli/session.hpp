@@ -57,6 +57,9 @@ struct Session {
 /// Adds the flag for ReportOptions to `command`.
 void add_report_flag(CLI::App& command, ReportOptions& options);
 
+/// Adds the flag for open_source()'s largest images to `command`.
+void add_image_flag(CLI::App& command, int& max_megapixels);
+
 /// Runs a detector over the session's images into the folder that `flags` names, with progress on
 /// stderr and a summary on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in order.
 /// Throws Error.

@@ -172,6 +172,7 @@ Json to_json(const RunRecord& record, const std::vector<Detection>& detections) 
   if (!record.map_path.empty()) {
     json["map"] = {{"path", record.map_path}, {"session", record.map_session}};
   }
+  if (!record.early_end.empty()) json["input"]["early_end"] = record.early_end;
   if (record.views != 1) json["input"]["views"] = record.views;
   if (!record.truth.empty()) json["truth"] = record.truth;
   if (record.truth_every != 1) json["truth_every"] = record.truth_every;

@@ -38,6 +38,7 @@ struct RunRecord {
   std::string stopped_by = "end";
   double wall_s = 0;                        ///< reading and detecting
   std::vector<std::string> arguments = {};  ///< of the command, after its name; empty = a library's
+  std::string early_end = {};               ///< of the input, see ImageSource
   std::string truth = {};                   ///< what says what is true, for people
   int truth_every = 1;                      ///< see GroundTruth::every
   std::optional<Evaluation> score = std::nullopt;
