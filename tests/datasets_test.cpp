@@ -488,7 +488,8 @@ TEST_F(Datasets, HugeDeclaredSizeIsAFrameError) {
       std::search(jpeg.begin(), jpeg.end(), kFrameHeader.begin(), kFrameHeader.end());
   ASSERT_NE(header, jpeg.end());
   std::fill_n(header + 5, 4, static_cast<unsigned char>(0xFE));  // height and width
-  expect_frame_error(read_bytes("x.jpg", jpeg), "has 65278 x 65278 pixels, but at most 100 mega");
+  expect_frame_error(read_bytes("x.jpg", jpeg),
+                     "has 65278 x 65278 pixels, but max_megapixels is 100");
 }
 
 /// `image` in each format and variant of a header that gives its size.
@@ -513,20 +514,19 @@ std::vector<std::pair<std::string, Bytes>> in_all_formats(const cv::Mat& image) 
 }
 
 TEST_F(Datasets, LargeImagesAreRefusedByTheirHeaders) {
-  constexpr int kMegapixels = 2;
-  const auto larger = in_all_formats(noise(CV_8UC3, {2000, 1001}));
-  const auto largest = in_all_formats(noise(CV_8UC3, {2000, 1000}));
+  constexpr int kMegapixels = 1;
+  const auto larger = in_all_formats(cv::Mat(501, 2000, CV_8UC3, cv::Scalar::all(90)));
+  const auto largest = in_all_formats(cv::Mat(500, 2000, CV_8UC3, cv::Scalar::all(90)));
   for (std::size_t i = 0; i < larger.size(); ++i) {
     const std::string name = std::to_string(i) + larger[i].first;
     write(name, larger[i].second);
     Frame frame;
     ASSERT_TRUE(open_source(path(name), kMegapixels)->next(frame));
-    expect_frame_error(frame, "has 2000 x 1001 pixels, but at most 2 megapixels are read");
-    EXPECT_NE(frame.error.find("raise max_megapixels"), std::string::npos);
+    expect_frame_error(frame, "has 2000 x 501 pixels, but max_megapixels is 1:");
     write(name, largest[i].second);
     ASSERT_TRUE(open_source(path(name), kMegapixels)->next(frame));
     EXPECT_EQ(frame.error, "");
-    EXPECT_EQ(frame.image.size(), cv::Size(2000, 1000)) << name;
+    EXPECT_EQ(frame.image.size(), cv::Size(2000, 500)) << name;
   }
 }
 
@@ -544,20 +544,21 @@ TEST_F(Datasets, HeadersOfEveryKindGiveTheSize) {
   write("x.pgm", "P5 # 1 1\n#\n99999\t99999 255\n");
   expect_frame_error(read_one("x.pgm"), "has 99999 x 99999 pixels");
   write("x.pgm", "P2 99999999999999999999 7 255\n");
-  expect_frame_error(read_one("x.pgm"), "megapixels");
+  expect_frame_error(read_one("x.pgm"), "max_megapixels");
 }
 
 TEST_F(Datasets, FormatsWhoseSizeIsUnknownAreNotDecoded) {
-  for (const std::string extension : {".jp2", ".ras", ".hdr", ".pam"}) {
-    const Bytes bytes = encode(extension, noise(CV_8UC3));
-    ASSERT_EQ(cv::imdecode(bytes, cv::IMREAD_COLOR).size(), cv::Size(40, 24)) << extension;
+  for (const std::string extension : {".jp2", ".ras", ".pam"}) {
+    const cv::Size size(128, 96);
+    const Bytes bytes = encode(extension, noise(CV_8UC3, size));
+    ASSERT_EQ(cv::imdecode(bytes, cv::IMREAD_COLOR).size(), size) << extension;
     expect_frame_error(read_bytes("x.png", bytes), "convert it to PNG or JPEG");
   }
 }
 
 TEST_F(Datasets, NoHeaderIsReadBeyondItsEnd) {
   for (const auto& [extension, bytes] : in_all_formats(noise(CV_8UC3))) {
-    for (std::size_t length = 1; length < std::min<std::size_t>(bytes.size(), 200); ++length) {
+    for (std::size_t length = 1; length < std::min<std::size_t>(bytes.size(), 100); length += 3) {
       const Bytes cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(length));
       EXPECT_TRUE(read_bytes("x" + extension, cut).image.empty()) << extension << length;
     }
@@ -669,7 +670,6 @@ TEST_F(Datasets, TheEarlyEndIsPassedOnFromTheEnd) {
   EXPECT_EQ(limited->early_end(), "") << "what is missing was not asked for";
 }
 
-/// The sizes in a container that say how long the file is.
 TEST_F(Datasets, OnlyACutVideoIsCalledCut) {
   struct Case {
     std::string name, codec;

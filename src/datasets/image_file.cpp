@@ -106,8 +106,8 @@ void check_pixel_count(std::int64_t width, std::int64_t height, int max_megapixe
   if (static_cast<double>(width) * static_cast<double>(height) <= max_megapixels * kMegapixel) {
     return;
   }
-  fail(thing, fmt::format("has {} x {} pixels, but at most {} megapixels are read: scale it down, "
-                          "or raise max_megapixels",
+  fail(thing, fmt::format("has {} x {} pixels, but max_megapixels is {}: scale it down, or raise "
+                          "the limit",
                           width, height, max_megapixels));
 }
 
