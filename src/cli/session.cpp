@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -29,8 +28,10 @@ namespace {
 
 constexpr std::size_t kFramesReadAhead = 8;
 
+/// No more than there are cores that this process may use: TBB warns of more.
 int thread_count(int wanted) {
-  return wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int cores = cv::getNumberOfCPUs();
+  return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
 void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
@@ -84,7 +85,9 @@ void SessionFlags::add_to(CLI::App& command) {
       .add_option("--set", settings, "One setting, such as surf.max_keypoints=500; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
-  command.add_option("--threads", threads, "Threads; 0 = one a core. Changes no result")
+  command
+      .add_option("--threads", threads,
+                  "Threads, at most one a core; 0 = as many. Changes no result")
       ->type_name("N")
       ->check(whole_number(0, 1024));
   command.add_flag("--no-report", no_report, "Keep no pictures and write no report.html");
@@ -139,7 +142,7 @@ int run_session(Session session, const SessionFlags& flags) {
                         .arguments = session.arguments,
                         .truth = session.truth_description},
                        {flags.out, flags.overwrite, flags.keep_images, inputs});
-  cv::setNumThreads(std::min(threads, thread_count(0)));  // TBB warns of more
+  cv::setNumThreads(threads);
   if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
   try {
     drive(*session.source, recorded, !flags.no_report, stop_requested);
@@ -150,7 +153,7 @@ int run_session(Session session, const SessionFlags& flags) {
   } catch (const Error& error) {
     try {
       recorded.finish(error.what());
-    } catch (const Error&) {  // the disk that failed the run fails its record, too
+    } catch (const Error&) {  // the first error is the one to tell
     }
     throw;
   }

@@ -28,7 +28,7 @@ struct SessionFlags {
   std::string preset = "default";
   std::string config;
   std::vector<std::string> settings;  ///< "section.field=value"
-  int threads = 0;                    ///< 0 = one a core
+  int threads = 0;                    ///< at most one a core; 0 = as many
   bool no_report = false;
   ReportOptions report;
 
