@@ -3,6 +3,7 @@
 # SPDX-License-Identifier: MIT
 """The loopbit command as a user meets it: what it writes, says and exits with."""
 
+import contextlib
 import json
 import os
 import pathlib
@@ -11,10 +12,13 @@ import re
 import resource
 import shutil
 import signal
+import sqlite3
+import struct
 import subprocess
 import tempfile
 import time
 import unittest
+import zlib
 
 from loopbit_command import (FRAMES, LOOPBIT, QUICK, WORLD, CommandTest, decisions, loopbit, rows)
 
@@ -180,6 +184,97 @@ class CommandLineTest(CommandTest):
         self.assertEqual(ran.returncode, 3)
         self.assertIn("None of the 1 frames", ran.stderr)
         self.assertEqual(rows(self.out)[0]["status"], "unreadable")
+
+    def pictures(self):
+        """The reference run's small JPEG pictures of its frames."""
+        with contextlib.closing(sqlite3.connect(self.reference / "evidence.db")) as evidence:
+            return [row[0] for row in evidence.execute("SELECT picture FROM frame")]
+
+    def test_libraries_print_nothing_of_damaged_images(self):
+        folder = self.few_images(3)
+        whole = (folder / "000001.png").read_bytes()
+        middle = len(whole) // 2
+        (folder / "000001.png").write_bytes(whole[:middle] + b"damage" + whole[middle + 6:])
+        ran = loopbit("run", folder, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertRegex(ran.stderr, r"^loopbit: Frame 1: .*000001\.png.*\n$")
+        for image in folder.iterdir():
+            image.unlink()
+        for number, jpeg in enumerate(self.pictures()[:3]):
+            middle = len(jpeg) // 2
+            (folder / f"{number}.jpg").write_bytes(jpeg[:middle] + jpeg[middle + 50:])
+        ran = loopbit("run", folder, "--out", self.scratch / "jpeg")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(ran.stderr, "", "libjpeg makes something of them")
+        video = self.scratch / "v.mp4"
+        video.write_bytes(b"\0\0\0\x10ftypisom\0\0\2\0\0\0\1\0mdat" + bytes(1000))
+        ran = loopbit("run", video, "--out", self.scratch / "mp4")
+        self.assertEqual(ran.returncode, 3)
+        self.assertRegex(ran.stderr, r"^loopbit: '.*v\.mp4' is not a video .*\n$")
+
+    def test_large_images_are_refused_by_their_headers(self):
+        folder = self.few_images(3)
+        header = struct.pack(">4sIIBBBBB", b"IHDR", 60000, 20000, 8, 2, 0, 0, 0)
+        checked = header + struct.pack(">I", zlib.crc32(header))
+        (folder / "000001.png").write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + checked +
+                                            struct.pack(">I4sI", 0, b"IEND", 0xAE426082))
+        ran = loopbit("run", folder, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertRegex(ran.stderr, r"^loopbit: Frame 1: .*000001\.png.* 60000 x 20000 pixels, but "
+                                     r"max_megapixels is 100: .*\n$")
+        ran = loopbit("run", folder, "--out", self.out, "--overwrite", "--max-megapixels", 1200)
+        self.assertIn("damaged", ran.stderr)
+
+    def test_a_video_that_is_cut_off_says_so(self):
+        def chunk(name, *parts):
+            data = b"".join(parts)
+            return name + struct.pack("<I", len(data)) + data + bytes(len(data) % 2)
+
+        jpegs = self.pictures()[:20]
+        header = struct.pack("<14I", 100000, 0, 0, 0, len(jpegs), 0, 1, 0, 256, 192, 0, 0, 0, 0)
+        stream = b"vidsMJPG" + struct.pack("<IHH8I4H", 0, 0, 0, 0, 1, 10, 0, len(jpegs), 0,
+                                           0xFFFFFFFF, 0, 0, 0, 256, 192)
+        picture = struct.pack("<IiiHH4sIiiII", 40, 256, 192, 1, 24, b"MJPG", 147456, 0, 0, 0, 0)
+        headers = chunk(b"LIST", b"hdrl", chunk(b"avih", header),
+                        chunk(b"LIST", b"strl", chunk(b"strh", stream), chunk(b"strf", picture)))
+        movie = chunk(b"LIST", b"movi", *(chunk(b"00dc", jpeg) for jpeg in jpegs))
+        video = self.scratch / "v.avi"
+        whole = chunk(b"RIFF", b"AVI ", headers, movie)
+        for name, size in {"whole": len(whole), "cut": len(whole) // 2}.items():
+            with self.subTest(name):
+                video.write_bytes(whole[:size])
+                ran = loopbit("run", video, "--out", self.out, "--overwrite")
+                self.assertEqual(ran.returncode, 0, ran.stderr)
+                told = json.loads((self.out / "run.json").read_text())["input"].get("early_end")
+                if name == "whole":
+                    self.assertEqual([len(rows(self.out)), told, ran.stderr], [20, None, ""])
+                else:
+                    self.assertLess(len(rows(self.out)), 20)
+                    self.assertEqual(ran.stderr, f"loopbit: {told}\n")
+                    self.assertIn(f"'{video}' is cut off after {size} of", told)
+                self.assertEqual("cut off" in ran.stdout, name == "cut")
+
+    def test_only_regular_files_are_waited_for(self):
+        for name in ("v.avi", "v.png", "list.txt"):
+            pipe = self.scratch / name
+            os.mkfifo(pipe)
+            self.assert_fails(loopbit("run", pipe, "--out", self.out), 3, pipe, "neither a file")
+        listed = self.scratch / "images.txt"
+        device = self.scratch / "device.png"
+        device.symlink_to("/dev/zero")
+        listed.write_text(f"v.png\ndevice.png\n{self.images / '000000.png'}\n")
+        ran = loopbit("run", listed, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        for name in ("v.png", "device.png"):
+            self.assertIn(f"{name}' is a folder, a pipe or a device", ran.stderr)
+
+    def test_no_more_threads_than_cores_to_run_on(self):
+        core = {next(iter(os.sched_getaffinity(0)))}
+        ran = loopbit("run", self.few_images(3), "--out", self.out, "--threads", 2,
+                      preexec_fn=lambda: os.sched_setaffinity(0, core))
+        self.assertEqual([ran.returncode, ran.stderr], [0, ""])
+        self.assertIn("with 1 thread;", ran.stdout)
+        self.assertEqual(json.loads((self.out / "run.json").read_text())["threads"], 1)
 
     # Bad input, output and options: one sentence, an exit code, nothing lost.
 
@@ -354,8 +449,8 @@ class CommandLineTest(CommandTest):
     def test_full_disk_keeps_whole_rows(self):
         # So many that their rows take more than what run.json begins with.
         images = self.scratch / "images.txt"
-        images.write_text("".join(f"{image}\n" for image in self.few_images().iterdir()) * 10)
-        ran = self.run_on_small_disk(images, 3000, "--no-report")
+        images.write_text("".join(f"{image}\n" for image in self.few_images().iterdir()) * 30)
+        ran = self.run_on_small_disk(images, 20_000, "--no-report")
         self.assert_fails(ran, 4, "loops.csv", "rows before are kept")
         text = (self.out / "loops.csv").read_text()
         self.assertTrue(text.endswith("\n"))
@@ -369,6 +464,36 @@ class CommandLineTest(CommandTest):
         self.assert_fails(ran, 4, "evidence.db", "free space", "--no-report")
         self.assertGreater(len(rows(self.out)), 0)
         self.assertIn("evidence.db", json.loads((self.out / "run.json").read_text())["stopped_by"])
+
+    def test_a_full_disk_costs_no_earlier_run(self):
+        few = self.few_images(3)
+        self.assertEqual(loopbit("run", few, "--out", self.out, "--no-report").returncode, 0)
+        before = {file: file.read_bytes() for file in self.out.iterdir()}
+        for bytes_left in (40, 2000):
+            ran = self.run_on_small_disk(few, bytes_left, "--no-report", "--overwrite")
+            self.assert_fails(ran, 4, self.out)
+            self.assertEqual({file: file.read_bytes() for file in self.out.iterdir()}, before)
+
+    def test_how_a_run_ends_on_a_full_disk_is_kept(self):
+        self.out.mkdir()
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", self.out],
+                                 capture_output=True, text=True)
+        if mounted.returncode != 0:
+            self.skipTest(f"no small disk here: {mounted.stderr}")
+        try:
+            few = self.few_images()
+            ran = loopbit("run", few, "--out", self.out)
+            self.assert_fails(ran, 4, self.out)
+            record = json.loads((self.out / "run.json").read_text())
+            self.assertEqual(ran.stderr, f"loopbit: {record['stopped_by']}\n")
+            with contextlib.suppress(OSError), open(self.out / "filler", "wb", 0) as filler:
+                while filler.write(bytes(512)):
+                    pass
+            before = {file: file.read_bytes() for file in self.out.iterdir()}
+            self.assert_fails(loopbit("run", few, "--out", self.out, "--overwrite"), 4, self.out)
+            self.assertEqual({file: file.read_bytes() for file in self.out.iterdir()}, before)
+        finally:
+            subprocess.run(["umount", self.out], check=True)
 
     def test_bad_settings(self):
         cases = [
@@ -439,18 +564,44 @@ class CommandLineTest(CommandTest):
             self.assert_fails(ran, 2, flags[0], "--write-images")
         self.assertFalse((self.scratch / "town").exists())
 
-    def test_ctrl_c_ends_cleanly_and_keeps_what_was_found(self):
-        process = subprocess.Popen([LOOPBIT, "run", self.images, "--out", self.out],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def interrupted_run(self, number, images=None, **options):
+        process = subprocess.Popen([LOOPBIT, "run", images or self.images, "--out", self.out],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   **options)
         loops = self.out / "loops.csv"
         deadline = time.monotonic() + 60
         while time.monotonic() < deadline:
             if loops.exists() and len(loops.read_text().splitlines()) > FRAMES // 8:
                 break
             time.sleep(0.005)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         output, errors = process.communicate(timeout=60)
-        self.assertEqual(process.returncode, 130, errors)
+        return process.returncode, output, errors
+
+    def test_what_libraries_printed_is_shown_when_the_process_aborts(self):
+        images = self.scratch / "images"
+        shutil.copytree(self.images, images)
+        whole = (images / "000001.png").read_bytes()
+        middle = len(whole) // 2
+        (images / "000001.png").write_bytes(whole[:middle] + b"damage" + whole[middle + 6:])
+        code, _, errors = self.interrupted_run(signal.SIGABRT, images)
+        self.assertEqual(code, -signal.SIGABRT, errors)
+        self.assertRegex(errors, r"\nlibpng error: .*\n$")
+
+    def test_a_hangup_that_is_ignored_ends_nothing(self):
+        code, _, errors = self.interrupted_run(
+            signal.SIGHUP, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+        self.assertEqual(code, 0, errors)
+        self.assertEqual(len(rows(self.out)), FRAMES)
+
+    def test_signals_end_cleanly_and_keep_what_was_found(self):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            with self.subTest(number):
+                shutil.rmtree(self.out, ignore_errors=True)
+                self.check_interrupted(*self.interrupted_run(number))
+
+    def check_interrupted(self, code, output, errors):
+        self.assertEqual(code, 130, errors)
         self.assertIn("interrupted", output)
         record = json.loads((self.out / "run.json").read_text())
         self.assertEqual(record["stopped_by"], "interrupt")

@@ -32,15 +32,16 @@ using Times = std::vector<std::optional<double>>;
 using Positions = std::vector<std::optional<cv::Vec3d>>;
 using Free = py::call_guard<WithoutGil>;
 
-std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit) {
+std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit,
+                                          int max_megapixels) {
   if (every < 1 || limit < 0) {
     throw Error(ErrorKind::option,
                 fmt::format("every is {} and limit is {}, but every must be at least 1, and limit "
                             "0 (no limit) or more.",
                             every, limit));
   }
-  auto source = subsample(open_source(input.string()), static_cast<std::size_t>(every),
-                          static_cast<std::size_t>(limit));
+  auto source = subsample(open_source(input.string(), max_megapixels),
+                          static_cast<std::size_t>(every), static_cast<std::size_t>(limit));
   return std::make_unique<SharedSource>(std::move(source), input.string(), every, limit);
 }
 
@@ -51,6 +52,11 @@ Frame next_frame(SharedSource& source) {
     if (source.next(frame)) return frame;
   }
   throw py::stop_iteration();
+}
+
+std::string early_end_of(const SharedSource& source) {
+  const WithoutGil release;
+  return source.early_end();
 }
 
 void bind_source(py::module_& module) {
@@ -81,15 +87,21 @@ void bind_source(py::module_& module) {
       .def(
           "description", [](const SharedSource& self) { return Text{self.description()}; },
           "One line that describes the source.")
+      .def(
+          "early_end", [](const SharedSource& self) { return Text{early_end_of(self)}; },
+          "After the last frame: why the input ended early, such as a video that is cut off. Empty "
+          "if it did not.")
       .def_property_readonly("every", &SharedSource::every, "Only every N-th frame is read.")
       .def("__repr__", [](const SharedSource& self) {
         return Text{fmt::format("ImageSource('{}')", self.description())};
       });
-  module.def("open_source", &open_shared, py::arg("input"), py::kw_only(), whole("every") = 1,
-             whole("limit") = 0, Free(),
-             "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
-             "folder, a text file that lists images, an image, a video, or 'camera:N'. Reads only "
-             "every N-th frame, and at most limit frames (0 = all).");
+  module.def(
+      "open_source", &open_shared, py::arg("input"), py::kw_only(), whole("every") = 1,
+      whole("limit") = 0, whole("max_megapixels") = kMaxMegapixels, Free(),
+      "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
+      "folder, a text file that lists images, an image, a video, or 'camera:N'. Reads only "
+      "every N-th frame, and at most limit frames (0 = all). Images above max_megapixels are "
+      "unreadable.");
   module.def("_frames_taken", &SharedSource::frames_taken, py::arg("source"), Free());
   module.def("_frames_left", &SharedSource::frames_left, py::arg("source"), Free());
 }

@@ -73,6 +73,12 @@ void tell(const Callback<Told>& callback, const Told& told) {
   if (!result) throw py::error_already_set();
 }
 
+/// Told like a bad frame, and last.
+void tell_early_end(const ImageSource& source, const OnBadFrame& on_bad_frame) {
+  const std::string why = source.early_end();
+  if (!why.empty()) tell(on_bad_frame, Text{why});
+}
+
 std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector,
                                   const OnDetection& on_detection, const OnBadFrame& on_bad_frame) {
   std::vector<Detection> detections;
@@ -87,6 +93,7 @@ std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector
   {
     const WithoutGil release;
     detector.exclusively([&](LoopDetector& free) { run(source, free, listener, never); });
+    tell_early_end(source, on_bad_frame);
   }
   return detections;
 }
@@ -110,6 +117,7 @@ void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_ba
   const std::atomic<bool> never{false};
   const WithoutGil release;
   recorded.detect(source, listener, keep_evidence, never);
+  tell_early_end(source, on_bad_frame);
 }
 
 void keep_positions(RecordedRun& recorded, const PositionRows& positions_m) {

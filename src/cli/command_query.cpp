@@ -40,6 +40,7 @@ struct QueryFlags {
   std::string place_images;
   std::size_t map_cache_mb = kMapCache_mb;
   std::vector<std::string> settings;
+  int max_megapixels = kMaxMegapixels;
   bool json = false;
 };
 
@@ -119,11 +120,14 @@ class Relocalizer {
   /// called in it.
   void ask(const std::string& input, const std::string& name) {
     try {
-      const auto source = open_source(input);
+      const auto source = open_source(input, flags_.max_megapixels);
       const std::string own_name = fs::path(input).filename().string();
       for (Frame frame; source->next(frame);) {
         frame.name = frame.name == own_name ? name : (fs::path(name) / frame.name).string();
         answer(frame);
+      }
+      if (const std::string why = source->early_end(); !why.empty()) {
+        tell(fmt::format("loopbit: {}\n", why));
       }
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;
@@ -206,6 +210,7 @@ void add_query(CLI::App& app, int& exit_code) {
                    "A new folder for the images of the places shown, if the map has any")
       ->type_name("DIR");
   add_map_cache_flag(*command, flags->map_cache_mb);
+  add_image_flag(*command, flags->max_megapixels);
   command->add_flag("--json", flags->json, "Print one JSON object per image, one per line");
   command
       ->add_option("--set", flags->settings,

@@ -17,6 +17,7 @@ struct RunFlags {
   std::string input;
   int every = 1;
   int limit = 0;
+  int max_megapixels = kMaxMegapixels;
   TruthFlags truth;
 };
 
@@ -25,8 +26,9 @@ int run_command(const RunFlags& flags, const Arguments& arguments) {
   if (flags.session.out.empty() && flags.session.map.empty()) {
     throw Error(ErrorKind::option, "The run has no output; add --out DIR, --map MAP.db, or both.");
   }
-  session.source = subsample(open_source(flags.input), static_cast<std::size_t>(flags.every),
-                             static_cast<std::size_t>(flags.limit));
+  session.source =
+      subsample(open_source(flags.input, flags.max_megapixels),
+                static_cast<std::size_t>(flags.every), static_cast<std::size_t>(flags.limit));
   flags.truth.check(flags.every, exact_size(*session.source, flags.input));
   session.evaluation = flags.truth.evaluation();
   session.truth = [&](const FrameTimes& times_s) {
@@ -66,6 +68,7 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   command->add_option("--limit", flags->limit, "Read at most N frames; 0 = all")
       ->type_name("N")
       ->check(whole_number(0, 2'000'000'000));
+  add_image_flag(*command, flags->max_megapixels);
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
   command->footer(list_truth_settings());

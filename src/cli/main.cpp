@@ -101,6 +101,7 @@ int main(int argc, char** argv) {
   // Past a file size limit, let write() fail, which is reported as any full disk is.
   std::signal(SIGXFSZ, SIG_IGN);
   cli::keep_closed_streams_closed();
+  cli::keep_libraries_quiet();
   try {
     return run_and_flush(argc, argv);
   } catch (const loopbit::Error& error) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -29,8 +28,10 @@ namespace {
 
 constexpr std::size_t kFramesReadAhead = 8;
 
+/// No more than there are cores that this process may use: TBB warns of more.
 int thread_count(int wanted) {
-  return wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int cores = cv::getNumberOfCPUs();
+  return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
 void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
@@ -84,7 +85,8 @@ void SessionFlags::add_to(CLI::App& command) {
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
   command
-      .add_option("--threads", threads, "Threads; 0 = one per core. Results do not depend on it")
+      .add_option("--threads", threads,
+                  "Threads, at most one per core; 0 = one per core. Results do not depend on it")
       ->type_name("N")
       ->check(whole_number(0, 1024));
   command.add_flag("--no-report", no_report, "Store no pictures and write no report.html");
@@ -107,6 +109,13 @@ void add_report_flag(CLI::App& command, ReportOptions& options) {
       ->type_name("MB")
       ->capture_default_str()
       ->check(number(0.0, 2000.0));
+}
+
+void add_image_flag(CLI::App& command, int& max_megapixels) {
+  command.add_option("--max-megapixels", max_megapixels, "Larger images are unreadable")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(whole_number(1, 1'000'000));
 }
 
 LoopDetectorOptions SessionFlags::detector_options() const {
@@ -145,15 +154,18 @@ int run_session(Session session, const SessionFlags& flags) {
                         .keep_images = flags.keep_images,
                         .map_cache_mb = flags.map_cache_mb,
                         .inputs = inputs});
-  cv::setNumThreads(std::min(threads, thread_count(0)));  // TBB warns of more
+  cv::setNumThreads(threads);
   if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
   try {
     drive(*session.source, recorded, !flags.no_report, stop_requested);
     warn_of_damage(flags.map, recorded.map_damage());
+    if (const auto& why = recorded.record().early_end; !why.empty()) {
+      tell(fmt::format("loopbit: {}\n", why));
+    }
   } catch (const Error& error) {
     try {
       recorded.finish(error.what());
-    } catch (const Error&) {  // the disk that failed the run fails its record, too
+    } catch (const Error&) {  // the first error is the one to tell
     }
     throw;
   }

@@ -31,7 +31,7 @@ struct SessionFlags {
   std::string preset = "default";
   std::string config;
   std::vector<std::string> settings;  ///< "section.field=value"
-  int threads = 0;                    ///< 0 = one a core
+  int threads = 0;                    ///< at most one a core; 0 = as many
   bool no_report = false;
   ReportOptions report;
 
@@ -62,6 +62,9 @@ void add_report_flag(CLI::App& command, ReportOptions& options);
 
 /// Adds the flag for what of a map stays in memory.
 void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb);
+
+/// Adds the flag for open_source()'s largest images to `command`.
+void add_image_flag(CLI::App& command, int& max_megapixels);
 
 /// Runs a detector over the session's images into the folder that `flags` names, with progress on
 /// stderr and a summary on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in order.

@@ -9,6 +9,10 @@ namespace loopbit::cli {
 /// Lets no file that is opened later take the place of a closed stdin, stdout or stderr.
 void keep_closed_streams_closed();
 
+/// From now on, what libraries print to stderr about damaged images and videos is not shown, but
+/// only the last of it if the process aborts. loopbit reports damage in its own words, by tell().
+void keep_libraries_quiet();
+
 /// Writes `text` to stderr. Where that fails there is nobody to tell, and nothing else is lost.
 void tell(const std::string& text);
 

@@ -58,8 +58,9 @@ std::string share_text(double share, std::int64_t whole, int decimals) {
 
 void print_summary(const RunRecord& record, const RunFolder& folder, bool has_report) {
   const auto& detections = folder.detections();
-  fmt::print("input      {} ({}), {} frames{}\n", record.input, record.description,
-             detections.size(), record.stopped_by == "interrupt" ? ", then interrupted" : "");
+  fmt::print("input      {} ({}), {} frames{}{}\n", record.input, record.description,
+             detections.size(), record.stopped_by == "interrupt" ? ", then interrupted" : "",
+             record.early_end.empty() ? "" : ", then cut off");
   const auto loops = count(detections, Status::loop);
   const auto elsewhere = match_list(detections).elsewhere.size();
   fmt::print("loops      {} frame{} at a place seen before{}\n", loops, loops == 1 ? "" : "s",

@@ -58,7 +58,8 @@ TruthMatrix read_mask(const std::string& path, int views) {
                             "original as PNG or .mat.",
                             path));
   }
-  const cv::Mat image = datasets::read_image_file(path);
+  constexpr int kMaxMegapixels = 1000;  // a row of pixels for each of 30,000 images
+  const cv::Mat image = datasets::read_image_file(path, kMaxMegapixels);
   const auto rows = static_cast<std::size_t>(image.rows);
   TruthMatrix matrix(fmt::format("Mask '{}'", path), {rows, static_cast<std::size_t>(image.cols)},
                      views);

@@ -114,6 +114,7 @@ void RecordedRun::detect(ImageSource& source, const RunListener& listener, bool 
     };
   }
   run(source, detector, recording, stop);
+  record_.early_end = source.early_end();
   if (map) map_damage_ = map->damage();
   if (evidence) evidence->finish();
   if (map) map->finish();

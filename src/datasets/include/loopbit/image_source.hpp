@@ -25,9 +25,8 @@ class ImageSource {
   virtual ~ImageSource() = default;
 
   /// Reads the next frame. False at the end. A damaged image is a frame with `error` set, not an
-  /// exception and not the end. A video that is cut off ends early, and a camera ends when it is
-  /// unplugged: no backend tells these from the end. frame.image shares no memory with frames
-  /// read before.
+  /// exception and not the end. A camera ends when it is unplugged. frame.image shares no memory
+  /// with frames read before.
   virtual bool next(Frame& frame) = 0;
 
   /// Skips the next frame without decoding it. False at the end.
@@ -39,7 +38,14 @@ class ImageSource {
 
   /// One line that describes the source, such as "KITTI odometry sequence, image_0".
   [[nodiscard]] virtual std::string description() const = 0;
+
+  /// When the end was reached: one sentence if the input ends before its time, such as a video that
+  /// is cut off. Empty if it does not, before the end, and where nothing tells.
+  [[nodiscard]] virtual std::string early_end() const { return {}; }
 };
+
+/// Larger images are not read, unless the caller allows it. Decoding takes up to 8 bytes per pixel.
+inline constexpr int kMaxMegapixels = 100;
 
 /// Opens a sequence. Its kind is detected:
 ///  - `camera:N`: a camera attached to this machine (N from 0 to 99), no times;
@@ -53,8 +59,11 @@ class ImageSource {
 ///  - an image file: that one image;
 ///  - any other file: a video, its times counted from its first frame.
 /// Throws Error (kind input) if nothing is there, no image is found or a list is malformed, and
-/// Error (kind option) if N is no camera number. Listed images are not looked at before next().
-std::unique_ptr<ImageSource> open_source(const std::string& input);
+/// Error (kind option) if N is no camera number. Listed images are not looked at before next(). An
+/// image of more than `max_megapixels` (at least 1) is not decoded, but unreadable, and a video of
+/// them is refused. Formats: PNG, JPEG, BMP, PBM, PGM, PPM, TIFF and WebP; videos as OpenCV reads.
+std::unique_ptr<ImageSource> open_source(const std::string& input,
+                                         int max_megapixels = kMaxMegapixels);
 
 /// Every N-th frame of `source` (1 = all), and at most `limit` frames (0 = no limit). Other frames
 /// are skipped, not decoded. Throws Error (kind option) if `every` is 0.

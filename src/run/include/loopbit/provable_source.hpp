@@ -26,6 +26,9 @@ class ProvableSource final : public ImageSource {
   bool skip() override;
   [[nodiscard]] std::optional<std::size_t> size() const override { return source_->size(); }
   [[nodiscard]] std::string description() const override { return source_->description(); }
+  [[nodiscard]] std::string early_end() const override {
+    return ahead_.empty() ? source_->early_end() : "";
+  }
 
  private:
   std::unique_ptr<ImageSource> source_;

@@ -37,11 +37,14 @@ struct RunRecord {
   std::string stopped_by = "end";
   double wall_s = 0;  ///< reading and detecting
   std::vector<std::string> arguments =
-      {};                  ///< of the command, without its name; empty for a library
-  std::string truth = {};  ///< description of the truth, for people
-  int truth_every = 1;     ///< see GroundTruth::every
+      {};                      ///< of the command, without its name; empty for a library
+  std::string early_end = {};  ///< of the input, see ImageSource
+  std::string truth = {};      ///< description of the truth, for people
+  int truth_every = 1;         ///< see GroundTruth::every
   std::optional<Evaluation> score = std::nullopt;
 };
+
+class EarlierRun;
 
 /// The folder of a run. loops.csv has one row per frame and is complete at any time. run.json is
 /// written when the run begins, and again when it ends.
@@ -49,8 +52,15 @@ class RunFolder {
  public:
   /// Makes the folder and begins loops.csv. Throws Error (kind output) if the folder holds an
   /// earlier run and `overwrite` is not set, if one of its files is among `inputs` or of no run (a
-  /// data set has a truth.csv, too), or if it cannot be written.
+  /// data set has a truth.csv, too), or if it cannot be written. An earlier run is set aside in a
+  /// folder `earlier_run` inside, removed when this one has ended, and put back if this one leaves
+  /// no row.
   RunFolder(const std::string& path, bool overwrite, const std::vector<std::string>& inputs = {});
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+  RunFolder(RunFolder&&) = delete;
+  RunFolder& operator=(RunFolder&&) = delete;
 
   /// Appends a row and hands it to the system, so that it survives this process. Throws Error (kind
   /// output) if the disk is full; rows written before are kept.
@@ -64,7 +74,8 @@ class RunFolder {
   /// Writes positions.csv: camera centres, one per frame. Throws Error (kind output).
   void write_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m);
 
-  /// Writes run.json anew, all of it or nothing. Throws Error (kind output).
+  /// Writes run.json anew, all of it or nothing. Once it is there, a full disk has room for how the
+  /// run ends, unless its file system writes what is changed elsewhere. Throws Error (kind output).
   void write_record(const RunRecord& record);
 
   [[nodiscard]] const std::vector<Detection>& detections() const { return detections_; }
@@ -80,6 +91,7 @@ class RunFolder {
   };
 
   std::string path_;
+  std::unique_ptr<EarlierRun> earlier_;
   std::unique_ptr<std::FILE, CloseFile> loops_;  ///< unbuffered
   std::int64_t loops_bytes_ = 0;                 ///< of whole rows
   std::vector<Detection> detections_;
