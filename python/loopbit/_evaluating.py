@@ -36,6 +36,7 @@ def read_truth(
     ignore: Path | None = None,
     every: int = 1,
     times_s: Times = (),
+    all_read: bool = False,
 ) -> GroundTruth:
     """What is true about a sequence, by a file: rows of query,first,last or query,match; KITTI
     poses, a TUM trajectory or EuRoC states, which need the frames' times; a loop matrix as .mat,
@@ -43,7 +44,8 @@ def read_truth(
 
     A protocol fixes poses and views, which then must not be given. not_false and ignore are files
     of matches that are not wrong, and of queries that are not scored. All files count the frames of
-    the whole sequence, of which every so-many-th was read, at times_s.
+    the whole sequence, of which every so-many-th was read, at times_s. all_read: the sequence has
+    no frame after those, so that truth of more frames is refused.
     """
     kind = _loopbit.truth_kind(path)
     settings = PoseTruthOptions() if poses is None else poses
@@ -67,7 +69,7 @@ def read_truth(
                 f"{name} is about {_words(needed)}, but '{path}' is {_words(kind)}; leave it out, "
                 "or name another file."
             )
-    truth = _loopbit._read_truth(path, settings, variable, rows, every, list(times_s))
+    truth = _loopbit._read_truth(path, settings, variable, rows, every, list(times_s), all_read)
     if not_false is None and ignore is None:
         return truth
     near = truth.near_place.tolist()
@@ -147,8 +149,12 @@ def evaluate(
         raise _loopbit.OptionError(f"tolerance_frames is {tolerance}, but must be 0 or more.")
     matches = _matches(found)
     if not isinstance(truth, GroundTruth):
-        every = _every(found) if isinstance(found, FinishedRun) else 1
-        truth = read_truth(truth, protocol=protocol, every=every, times_s=matches.times_s)
+        every, is_whole = 1, False
+        if isinstance(found, FinishedRun):
+            every, is_whole = _every(found), _is_whole(found)
+        truth = read_truth(
+            truth, protocol=protocol, every=every, times_s=matches.times_s, all_read=is_whole
+        )
     return _loopbit._evaluate(matches, truth, tolerance, protocol)
 
 
@@ -161,6 +167,12 @@ def _every(run: FinishedRun) -> int:
     """Of the frames that files of truth count, every so-many-th was read."""
     every, views = (max(1, _value_at(run, "input", name, 1)) for name in ("every", "views"))
     return max(1, every // views)
+
+
+def _is_whole(run: FinishedRun) -> bool:
+    """The sequence has no frame after those of the run."""
+    record = _record(run)
+    return record.get("stopped_by") == "end" and _value_at(run, "input", "limit", 1) == 0
 
 
 def _value_at(run: FinishedRun, part: str, name: str, otherwise: _Value) -> _Value:

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/printable.hpp"
 
 namespace loopbit::cli {
 
@@ -21,7 +22,7 @@ void keep_closed_streams_closed() {
 }
 
 void tell(const std::string& text) {
-  (void)std::fputs(text.c_str(), stderr);
+  (void)std::fputs(printable(text).c_str(), stderr);
   (void)std::fflush(stderr);
 }
 

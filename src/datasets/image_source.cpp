@@ -87,9 +87,13 @@ datasets::ImageList single_image(const fs::path& file) {
   return {file.parent_path(), fmt::format("image {}", name), {{name, {}}}};
 }
 
-std::unique_ptr<ImageSource> open_file(const fs::path& file) {
+bool is_list(const fs::path& file) {
   const std::string extension = datasets::lower_extension(file);
-  if (extension == ".txt" || extension == ".csv") {
+  return extension == ".txt" || extension == ".csv";
+}
+
+std::unique_ptr<ImageSource> open_file(const fs::path& file) {
+  if (is_list(file)) {
     return std::make_unique<ImageListSource>(datasets::list_file(file));
   }
   if (datasets::is_image_name(file)) return std::make_unique<ImageListSource>(single_image(file));
@@ -113,7 +117,9 @@ std::unique_ptr<ImageSource> open_source(const std::string& input) {
 
 std::optional<std::size_t> exact_size(const ImageSource& source, const std::string& input) {
   std::error_code error;
-  return fs::is_directory(input, error) ? source.size() : std::nullopt;
+  const bool of_images =
+      fs::is_directory(input, error) || is_list(input) || datasets::is_image_name(input);
+  return of_images ? source.size() : std::nullopt;
 }
 
 }  // namespace loopbit

@@ -30,7 +30,8 @@ struct GroundTruth {
 
 /// Reads rows of `query,first,last` or, all of them, `query,match` (spaces do for commas, too) with
 /// 0 <= first <= last < query: places are earlier frames. Blank lines, `#` comments and a first row
-/// of names, in this order, are passed over. Throws Error (kind input) that names file and line for
+/// of names, in this order, are passed over; other names are refused where they are all there is.
+/// Throws Error (kind input) that names file and line for
 /// anything else.
 std::vector<PlaceRun> read_place_runs(const std::string& path);
 
@@ -45,7 +46,8 @@ void check_every(int every);
 /// as check_every() does.
 GroundTruth every_nth(const GroundTruth& truth, int every);
 
-/// Writes rows of `query,first,last` under a line of `comment`. Throws Error (kind output).
+/// Writes rows of `query,first,last`, or their names if there are none, under a line of `comment`.
+/// Throws Error (kind output).
 void write_place_runs(const std::string& path, const std::string& comment,
                       const std::vector<PlaceRun>& runs);
 

@@ -49,7 +49,7 @@ class ImageSource {
 ///  - any other folder: its images in natural order (2.png before 10.png), told by extension;
 ///    hidden files and sub-folders are passed over;
 ///  - a .txt or .csv file: a list, one image a line, relative to the file or to a folder `images`
-///    beside it, `#` for comments;
+///    beside it, `#` for comments; or names that NUL bytes end, as `find -print0` writes them;
 ///  - an image file: that one image;
 ///  - any other file: a video, its times counted from its first frame.
 /// Throws Error (kind input) if nothing is there, no image is found or a list is malformed, and
@@ -61,7 +61,7 @@ std::unique_ptr<ImageSource> open_source(const std::string& input);
 std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source, std::size_t every,
                                        std::size_t limit);
 
-/// How many frames `source`, opened from `input`, has in all, where that is sure: of a folder. A
+/// How many frames `source`, opened from `input`, has in all, where that is sure: of images. A
 /// video says about how many.
 std::optional<std::size_t> exact_size(const ImageSource& source, const std::string& input);
 
