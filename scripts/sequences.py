@@ -65,7 +65,7 @@ class Runner:
         _, truth, not_false, ignore = REAL[name]
         if truth is None:  # a drive without revisit: every loop is wrong
             truth = self.scratch / "none.csv"
-            truth.write_text("# no revisit\n")
+            truth.write_text("query,first,last\n")
         flags = []
         for flag, file in (("--truth", truth), ("--not-false", not_false), ("--ignore", ignore)):
             if file:

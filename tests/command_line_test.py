@@ -322,16 +322,18 @@ class CommandLineTest(CommandTest):
     def test_a_data_set_is_no_earlier_run(self):
         folder = self.scratch / "town"
         folder.mkdir()
-        truth = pathlib.Path(shutil.copy(self.dataset / "truth.csv", folder))
+        truth = folder / "truth.csv"
+        truth.write_text("5,1\n")
         ran = loopbit("run", self.few_images(), "--out", folder, "--no-report", "--truth", truth,
                       "--overwrite")
         self.assert_fails(ran, 4, folder, "truth.csv")
-        self.assertEqual(truth.read_bytes(), (self.dataset / "truth.csv").read_bytes())
+        self.assertEqual(truth.read_text(), "5,1\n")
         self.assertEqual(list(folder.iterdir()), [truth])
 
     def test_what_a_run_reads_is_not_replaced_by_it(self):
         few = self.few_images()
-        truth = self.dataset / "truth.csv"
+        truth = self.scratch / "truth.csv"
+        truth.write_text("5,1\n")
         run = ["run", few, "--out", self.out, "--no-report", "--truth"]
         self.assertEqual(loopbit(*run, truth).returncode, 0)
         own = self.out / "truth.csv"
@@ -409,9 +411,25 @@ class CommandLineTest(CommandTest):
         self.assertEqual(ran.returncode, 0, ran.stderr)
         self.assertIn("\ufffd", json.loads((self.out / "run.json").read_text())["input"]["path"])
         os.rename(self.out, folder + b"_run")
+        truth = self.scratch / "truth.csv"
+        truth.write_text("2,0\n")
         ran = subprocess.run([LOOPBIT, "compare", "--json", folder + b"_run", folder + b"_run",
-                              "--truth", self.dataset / "truth.csv"], capture_output=True)
+                              "--truth", truth], capture_output=True)
         self.assertEqual(ran.returncode, 0, ran.stderr)
+
+    def test_names_do_not_steer_the_terminal(self):
+        folder = self.few_images(3)
+        (folder / "z\x1b[31m\r\x9b.png").write_text("no image")
+        ran = loopbit("run", folder, "--out", self.scratch / "out\x1b[2J")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn("z\\x1b[31m\\x0d\\xc2\\x9b.png", ran.stderr)
+        self.assertIn("out\\x1b[2J", ran.stdout)
+        missing = loopbit("eval", "no\x1b[2J", "--truth", "no\x1b[2J")
+        self.assert_fails(missing, 3, "no\\x1b[2J")
+        unknown = loopbit("eval", self.reference, "more\x1b[2J")
+        self.assertEqual(unknown.returncode, 2)
+        for text in (ran.stdout, ran.stderr, missing.stderr, unknown.stderr):
+            self.assertNotRegex(text, "[\x00-\x09\x0b-\x1f\x7f-\x9f]")
 
     def test_times_are_needed_where_a_setting_is_in_seconds(self):
         ran = loopbit("run", self.few_images(), "--out", self.out, "--set", "exclusion.seconds=5")

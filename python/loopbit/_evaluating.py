@@ -36,6 +36,7 @@ def read_truth(
     ignore: Path | None = None,
     every: int = 1,
     times_s: Times = (),
+    all_read: bool = False,
 ) -> GroundTruth:
     """Reads a file of ground truth: rows of query,first,last or query,match; KITTI poses, a TUM
     trajectory or EuRoC states; a loop matrix as .mat, text or image.
@@ -43,7 +44,8 @@ def read_truth(
     poses, views and variable apply to poses and matrices; a protocol fixes poses and views.
     not_false is a file of matches that are not wrong, ignore a file of queries that are not scored.
     All files count the frames of the whole sequence; every means that only every N-th of them was
-    read. times_s has the times of the frames read, which trajectories with times need.
+    read. times_s has the times of the frames read, which trajectories with times need. all_read:
+    the sequence ends with those frames, so truth of more frames is refused.
     """
     kind = _loopbit.truth_kind(path)
     settings = PoseTruthOptions() if poses is None else poses
@@ -67,7 +69,7 @@ def read_truth(
                 f"{name} applies to {_words(needed)}, but '{path}' is {_words(kind)}; leave it "
                 "out, or give another file."
             )
-    truth = _loopbit._read_truth(path, settings, variable, rows, every, list(times_s))
+    truth = _loopbit._read_truth(path, settings, variable, rows, every, list(times_s), all_read)
     if not_false is None and ignore is None:
         return truth
     near = truth.near_place.tolist()
@@ -147,8 +149,12 @@ def evaluate(
         raise _loopbit.OptionError(f"tolerance_frames is {tolerance}, but must be 0 or more.")
     matches = _matches(found)
     if not isinstance(truth, GroundTruth):
-        every = _every(found) if isinstance(found, FinishedRun) else 1
-        truth = read_truth(truth, protocol=protocol, every=every, times_s=matches.times_s)
+        every, is_whole = 1, False
+        if isinstance(found, FinishedRun):
+            every, is_whole = _every(found), _is_whole(found)
+        truth = read_truth(
+            truth, protocol=protocol, every=every, times_s=matches.times_s, all_read=is_whole
+        )
     return _loopbit._evaluate(matches, truth, tolerance, protocol)
 
 
@@ -161,6 +167,12 @@ def _every(run: FinishedRun) -> int:
     """The N of "every N-th frame was read", in frames of the truth file."""
     every, views = (max(1, _value_at(run, "input", name, 1)) for name in ("every", "views"))
     return max(1, every // views)
+
+
+def _is_whole(run: FinishedRun) -> bool:
+    """The sequence has no frame after those of the run."""
+    record = _record(run)
+    return record.get("stopped_by") == "end" and _value_at(run, "input", "limit", 1) == 0
 
 
 def _value_at(run: FinishedRun, part: str, name: str, otherwise: _Value) -> _Value:

@@ -137,18 +137,19 @@ def run_folder(
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)
     every, frames = source.every, _loopbit._frames_left(source)
+    is_whole = frames is not None and _loopbit._limit(source) == 0
     _check_from_start(source, truth=truth, positions_m=positions_m)
     if keep_images and not map:
         raise _loopbit.OptionError("keep_images stores images in a map; give map, or leave it out.")
     if not callable(on_bad_frame):
         raise TypeError(f"on_bad_frame is {on_bad_frame!r}, but must be callable.")
-    _check_truth(truth, protocol, every, frames)
+    _check_truth(truth, protocol, every, frames, is_whole)
     tolerance = _loopbit.find_protocol(protocol).tolerance_frames if protocol else 0
     if positions_m is None and isinstance(truth, (str, os.PathLike)):
         if _loopbit.truth_kind(truth) == TruthKind.poses:
             positions_m = truth
     if isinstance(positions_m, (str, os.PathLike)):
-        _loopbit._check_poses(positions_m, frames, every)
+        _loopbit._check_poses(positions_m, frames, every, False)
     elif positions_m is not None:
         positions_m = numpy.asarray(positions_m, dtype=float)
         _check_positions(positions_m, frames)
@@ -172,7 +173,10 @@ def run_folder(
         times_s = recorded.times_s
         try:
             if isinstance(truth, (str, os.PathLike)):
-                truth = read_truth(truth, protocol=protocol, every=every, times_s=times_s)
+                all_read = is_whole and len(times_s) == frames
+                truth = read_truth(
+                    truth, protocol=protocol, every=every, times_s=times_s, all_read=all_read
+                )
             if truth is not None:
                 recorded.score(truth, tolerance, protocol)
         finally:
@@ -187,7 +191,11 @@ def run_folder(
 
 
 def _check_truth(
-    truth: GroundTruth | Path | None, protocol: str, every: int, frames: int | None
+    truth: GroundTruth | Path | None,
+    protocol: str,
+    every: int,
+    frames: int | None,
+    is_whole: bool,
 ) -> None:
     """Raises the errors of reading truth that can be found before the frames are read."""
     if truth is None:
@@ -202,9 +210,10 @@ def _check_truth(
     elif _loopbit.truth_kind(truth) == TruthKind.poses:
         if protocol:
             check_kind(protocol, truth)
-        _loopbit._check_poses(truth, frames, every)
+        _loopbit._check_poses(truth, frames, every, is_whole)
     else:
-        read_truth(truth, protocol=protocol, every=every, times_s=[None] * (frames or 0))
+        times_s = [None] * (frames or 0)
+        read_truth(truth, protocol=protocol, every=every, times_s=times_s, all_read=is_whole)
 
 
 def _check_positions(positions_m: numpy.typing.NDArray[Any], frames: int | None) -> None:

@@ -104,6 +104,7 @@ void bind_source(py::module_& module) {
       "unreadable.");
   module.def("_frames_taken", &SharedSource::frames_taken, py::arg("source"), Free());
   module.def("_frames_left", &SharedSource::frames_left, py::arg("source"), Free());
+  module.def("_limit", &SharedSource::limit, py::arg("source"));
 }
 
 std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {
@@ -206,10 +207,10 @@ void bind_poses(py::module_& module) {
       "a frame without a time. every means that only every N-th frame of the sequence was read.");
   module.def(
       "_check_poses",
-      [](const Path& path, std::optional<std::size_t> frames, int every) {
-        check_poses(path.string(), frames, every);
+      [](const Path& path, std::optional<std::size_t> frames, int every, bool all_read) {
+        check_poses(path.string(), frames, every, all_read);
       },
-      py::arg("path"), whole("frames"), whole("every"), Free());
+      py::arg("path"), whole("frames"), whole("every"), py::arg("all_read"), Free());
 }
 
 }  // namespace
@@ -225,11 +226,11 @@ void bind_data(py::module_& module) {
   module.def(
       "_read_truth",
       [](const Path& path, const PoseTruthOptions& poses, const std::string& variable, int views,
-         int every, const Times& times_s) {
-        return read_truth(path.string(), {poses, variable, views, every}, times_s);
+         int every, const Times& times_s, bool all_read) {
+        return read_truth(path.string(), {poses, variable, views, every, all_read}, times_s);
       },
       py::arg("path"), py::arg("poses"), py::arg("variable"), whole("views"), whole("every"),
-      py::arg("times_s"), Free());
+      py::arg("times_s"), py::arg("all_read"), Free());
   module.def(
       "_read_place_runs", [](const Path& path) { return take(place_runs_of(path.string())); },
       py::arg("path"));

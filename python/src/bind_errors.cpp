@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "loopbit/error.hpp"
+#include "loopbit/printable.hpp"
 
 #include "bindings.hpp"
 #include "text.hpp"
@@ -66,7 +67,7 @@ void bind_errors(py::module_& module) {
     try {
       if (thrown) std::rethrow_exception(std::move(thrown));
     } catch (const Error& error) {
-      PyErr_SetObject(type_of(error.kind()), py::cast(Text{error.what()}).ptr());
+      PyErr_SetObject(type_of(error.kind()), py::cast(Text{printable(error.what())}).ptr());
     }
   });
 }

@@ -10,6 +10,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/evaluation.hpp"
+#include "loopbit/printable.hpp"
 #include "loopbit/run_folder.hpp"
 
 #include "commands.hpp"
@@ -112,7 +113,7 @@ Row row_of(const ReportRun& run) {
 
 void print_table(const std::vector<Row>& rows) {
   std::size_t width = 4;
-  for (const Row& row : rows) width = std::max(width, row.name.size());
+  for (const Row& row : rows) width = std::max(width, printable(row.name).size());
   fmt::print(
       "{:<{}}  revisits  recall  precision  wrong  R@100%P  avg.prec.  pair recall   mean ms    "
       "p99 ms\n",
@@ -122,8 +123,8 @@ void print_table(const std::vector<Row>& rows) {
     const auto of_revisits = [&](double share) {
       return share_text(share, e.decision.positives, 4);
     };
-    fmt::print("{:<{}}  {:8}  {:>6}     {:>6}  {:5}   {:>6}     {:>6}       {:>6}", row.name, width,
-               e.decision.positives, of_revisits(e.decision.recall()),
+    fmt::print("{:<{}}  {:8}  {:>6}     {:>6}  {:5}   {:>6}     {:>6}       {:>6}",
+               printable(row.name), width, e.decision.positives, of_revisits(e.decision.recall()),
                share_text(e.decision.precision(), e.decision.right + e.decision.wrong, 4),
                e.decision.wrong, of_revisits(e.recall_at_full_precision),
                of_revisits(e.average_precision),
@@ -154,7 +155,7 @@ void compare_command(const CompareFlags& flags) {
     print_json(rows);
   } else {
     print_table(rows);
-    if (!flags.out.empty()) fmt::print("report     {}\n", flags.out);
+    if (!flags.out.empty()) fmt::print("report     {}\n", printable(flags.out));
   }
   if (flags.open) open_page(flags.out);
 }

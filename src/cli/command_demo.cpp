@@ -75,7 +75,7 @@ int demo_command(const DemoFlags& flags, const Arguments& arguments) {
                                                  name));
     }
   }
-  flags.truth.check(1, static_cast<std::size_t>(std::max(0, options.frames)));
+  flags.truth.check(1, static_cast<std::size_t>(std::max(0, options.frames)), true);
   const auto world = std::make_shared<const World>(options);
   if (!flags.images.empty()) {
     check_nothing_is_detected(flags);

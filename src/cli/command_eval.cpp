@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/evaluation.hpp"
+#include "loopbit/printable.hpp"
 #include "loopbit/protocol.hpp"
 
 #include "commands.hpp"
@@ -68,7 +69,7 @@ std::string described(const std::string& protocol) {
   for (const Protocol& known : protocols()) {
     if (known.name == protocol) return fmt::format("{}: {}", known.name, known.help);
   }
-  return protocol;
+  return printable(protocol);
 }
 
 void print_wrong(const std::vector<ReportedMatch>& wrong) {

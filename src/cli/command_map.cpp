@@ -11,6 +11,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/map_tools.hpp"
+#include "loopbit/printable.hpp"
 #include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
@@ -66,7 +67,7 @@ void info_command(const std::string& path, bool json) {
     if (!map.sessions().empty()) info["options"] = Json::parse(to_json(map.options()));
     fmt::print("{}\n", dump(info));
   } else {
-    fmt::print("map        {}, {:.1f} MB", path, static_cast<double>(bytes) / 1e6);
+    fmt::print("map        {}, {:.1f} MB", printable(path), static_cast<double>(bytes) / 1e6);
     if (places > 0)
       fmt::print(", {:.1f} KB per place",
                  static_cast<double>(bytes) / 1e3 / static_cast<double>(places));
@@ -77,8 +78,8 @@ void info_command(const std::string& path, bool json) {
                  static_cast<double>(images.bytes) / 1e6);
     }
     for (const MapSession& session : map.sessions()) {
-      fmt::print("  {:>9} {} ({}, {} frames)\n", session.session, session.name, session.started,
-                 session.frames);
+      fmt::print("  {:>9} {} ({}, {} frames)\n", session.session, printable(session.name),
+                 session.started, session.frames);
     }
   }
   warn_of_damage(map);
@@ -105,7 +106,7 @@ void list_command(const std::string& path, bool json) {
                       {"loopbit", s.loopbit}});
     } else {
       fmt::print("{:>7}  {:<20}  {:>9}  {:>9}  {:>9}  {:<32}  {}\n", s.session, s.started, s.frames,
-                 places[s.session], loops[s.session], s.uid, s.name);
+                 places[s.session], loops[s.session], s.uid, printable(s.name));
     }
   }
   if (json) fmt::print("{}\n", dump(list));

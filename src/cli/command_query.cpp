@@ -16,6 +16,7 @@
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
+#include "loopbit/printable.hpp"
 
 #include "commands.hpp"
 #include "map_damage.hpp"
@@ -79,7 +80,8 @@ void print_row(const std::string& image, std::string_view status, const ShownPla
              shown.image.empty() ? "" : "  ", shown.image);
 }
 
-void print_rows(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
+void print_rows(const std::string& name, Status status, const std::vector<ShownPlace>& places) {
+  const std::string image = printable(name);
   if (places.empty()) fmt::print("{:<24}  {}\n", image, to_string(status));
   for (std::size_t i = 0; i < places.size(); ++i) {
     print_row(i == 0 ? image : "", i == 0 ? to_string(status) : "", places[i]);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/printable.hpp"
 
 #include "commands.hpp"
 #include "open_page.hpp"
@@ -38,7 +39,7 @@ void report_command(const ReportFlags& flags) {
   write_report(path, {run}, flags.report);
   std::error_code no_file;  // but a device or a pipe
   const auto bytes = std::filesystem::file_size(path, no_file);
-  fmt::print("report     {}{}\n", path,
+  fmt::print("report     {}{}\n", printable(path),
              no_file ? "" : fmt::format(" ({:.1f} MB)", static_cast<double>(bytes) / 1e6));
   if (flags.open) open_page(path);
 }

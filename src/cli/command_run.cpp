@@ -29,10 +29,12 @@ int run_command(const RunFlags& flags, const Arguments& arguments) {
   session.source =
       subsample(open_source(flags.input, flags.max_megapixels),
                 static_cast<std::size_t>(flags.every), static_cast<std::size_t>(flags.limit));
-  flags.truth.check(flags.every, exact_size(*session.source, flags.input));
+  const std::optional<std::size_t> frames = exact_size(*session.source, flags.input);
+  const bool is_whole = frames && flags.limit == 0;
+  flags.truth.check(flags.every, frames, is_whole);
   session.evaluation = flags.truth.evaluation();
-  session.truth = [&](const FrameTimes& times_s) {
-    return flags.truth.read_truth(times_s, flags.every);
+  session.truth = [&, frames, is_whole](const FrameTimes& times_s) {
+    return flags.truth.read_truth(times_s, flags.every, is_whole && times_s.size() == *frames);
   };
   session.positions = [&](const FrameTimes& times_s) {
     return flags.truth.read_positions(times_s, flags.every);

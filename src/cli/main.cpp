@@ -4,6 +4,8 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <iostream>
+#include <sstream>
 #include <string>
 #include <system_error>
 
@@ -76,7 +78,10 @@ int run_command_line(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? cli::success : cli::bad_option;
+    std::ostringstream told;
+    const int code = app.exit(error, std::cout, told);
+    cli::tell(told.str());
+    return code == 0 ? cli::success : cli::bad_option;
   }
   return exit_code;
 }

@@ -85,6 +85,8 @@ ListedRun listed_run(const std::string& text) {
     run.evaluation.protocol = value_at(record, "/score/protocol", std::string());
     listed.frames.every = std::max(1, value_at(record, "/input/every", 1));
     listed.frames.views = std::max(1, value_at(record, "/input/views", 1));
+    listed.frames.all = value_at(record, "/stopped_by", std::string()) == "end" &&
+                        value_at(record, "/input/limit", 1) == 0;
   } else {
     run.list = read_match_list(path);
   }
@@ -98,7 +100,7 @@ void take_truth(ReportRun& run, const TruthFlags& flags, const FramesRead& frame
     run.positions_m = std::move(positions);
   }
   if (flags.given()) {
-    run.truth = flags.read_truth(frames.times_s, every);
+    run.truth = flags.read_truth(frames.times_s, every, frames.all);
     run.evaluation = flags.evaluation();
   }
 }

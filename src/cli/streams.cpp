@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/printable.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -68,7 +69,7 @@ void keep_closed_streams_closed() {
 }
 
 void tell(const std::string& text) {
-  (void)std::fputs(text.c_str(), own_stderr);
+  (void)std::fputs(printable(text).c_str(), own_stderr);
   (void)std::fflush(own_stderr);
 }
 

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/finished_run.hpp"
+#include "loopbit/printable.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -58,8 +59,9 @@ std::string share_text(double share, std::int64_t whole, int decimals) {
 
 void print_summary(const RunRecord& record, const RunFolder& folder, bool has_report) {
   const auto& detections = folder.detections();
-  fmt::print("input      {} ({}), {} frames{}{}\n", record.input, record.description,
-             detections.size(), record.stopped_by == "interrupt" ? ", then interrupted" : "",
+  fmt::print("input      {} ({}), {} frames{}{}\n", printable(record.input),
+             printable(record.description), detections.size(),
+             record.stopped_by == "interrupt" ? ", then interrupted" : "",
              record.early_end.empty() ? "" : ", then cut off");
   const auto loops = count(detections, Status::loop);
   const auto elsewhere = match_list(detections).elsewhere.size();
@@ -68,11 +70,11 @@ void print_summary(const RunRecord& record, const RunFolder& folder, bool has_re
   print_reasons(detections);
   if (record.score) print_score(record.score->decision);
   print_times(record, detections);
-  fmt::print("written    {0}/loops.csv, {0}/run.json\n", folder.path());
+  fmt::print("written    {0}/loops.csv, {0}/run.json\n", printable(folder.path()));
   if (!record.map_path.empty()) {
-    fmt::print("map        {}, session {}\n", record.map_path, record.map_session);
+    fmt::print("map        {}, session {}\n", printable(record.map_path), record.map_session);
   }
-  if (has_report) fmt::print("report     {}\n", folder.report_path());
+  if (has_report) fmt::print("report     {}\n", printable(folder.report_path()));
 }
 
 }  // namespace loopbit::cli

@@ -109,17 +109,20 @@ TruthOptions TruthFlags::truth_options(int every) const {
   return options;
 }
 
-void TruthFlags::check(int every, std::optional<std::size_t> frames) const {
+void TruthFlags::check(int every, std::optional<std::size_t> frames, bool all_read) const {
   (void)evaluation();
   (void)truth_options(every);
-  if (const std::string file = poses_file(); !file.empty()) check_poses(file, frames, every);
+  if (!poses.empty()) check_poses(poses, frames, every);
   if (!given()) return;
   const TruthKind kind = truth_kind(truth);
   check_kind(kind);
   GroundTruth others;
   add_others(others);
-  // What poses say needs the times of the frames.
-  if (kind != TruthKind::poses) (void)read_truth(FrameTimes(frames.value_or(0)), every);
+  if (kind == TruthKind::poses) {  // what they say needs the times of the frames
+    check_poses(truth, frames, every, all_read);
+  } else {
+    (void)read_truth(FrameTimes(frames.value_or(0)), every, all_read);
+  }
 }
 
 std::string TruthFlags::description() const {
@@ -173,10 +176,13 @@ void TruthFlags::add_others(GroundTruth& result) const {
   }
 }
 
-std::optional<GroundTruth> TruthFlags::read_truth(const FrameTimes& times_s, int every) const {
+std::optional<GroundTruth> TruthFlags::read_truth(const FrameTimes& times_s, int every,
+                                                  bool all_read) const {
   if (!given()) return std::nullopt;
   check_kind(truth_kind(truth));
-  GroundTruth result = loopbit::read_truth(truth, truth_options(every), times_s);
+  TruthOptions options = truth_options(every);
+  options.all_read = all_read;
+  GroundTruth result = loopbit::read_truth(truth, options, times_s);
   add_others(result);
   return result;
 }

@@ -89,9 +89,13 @@ datasets::ImageList single_image(const fs::path& file) {
   return {file.parent_path(), fmt::format("image {}", name), {{name, {}}}};
 }
 
-std::unique_ptr<ImageSource> open_file(const fs::path& file, int max_megapixels) {
+bool is_list(const fs::path& file) {
   const std::string extension = datasets::lower_extension(file);
-  if (extension == ".txt" || extension == ".csv") {
+  return extension == ".txt" || extension == ".csv";
+}
+
+std::unique_ptr<ImageSource> open_file(const fs::path& file, int max_megapixels) {
+  if (is_list(file)) {
     return std::make_unique<ImageListSource>(datasets::list_file(file), max_megapixels);
   }
   if (datasets::is_image_name(file)) {
@@ -121,7 +125,9 @@ std::unique_ptr<ImageSource> open_source(const std::string& input, int max_megap
 
 std::optional<std::size_t> exact_size(const ImageSource& source, const std::string& input) {
   std::error_code error;
-  return fs::is_directory(input, error) ? source.size() : std::nullopt;
+  const bool of_images =
+      fs::is_directory(input, error) || is_list(input) || datasets::is_image_name(input);
+  return of_images ? source.size() : std::nullopt;
 }
 
 }  // namespace loopbit

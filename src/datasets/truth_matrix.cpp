@@ -60,7 +60,8 @@ std::vector<PlaceRun> TruthMatrix::runs() const {
     for (std::size_t i = 0; i < places_[query].size(); ++i) {
       for (std::uint64_t word = places_[query][i]; word != 0; word &= word - 1) {
         const auto bit = static_cast<std::size_t>(std::countr_zero(word));
-        add_place(runs, static_cast<int>(query), static_cast<int>(i * kWordBits + bit));
+        const int place = static_cast<int>(i * kWordBits + bit);
+        add_places(runs, {static_cast<int>(query), place, place});
       }
     }
   }

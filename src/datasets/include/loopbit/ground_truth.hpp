@@ -30,7 +30,8 @@ struct GroundTruth {
 
 /// Reads rows of `query,first,last`, or rows of `query,match`, separated by commas or spaces, with
 /// 0 <= first <= last < query: places are earlier frames. Blank lines, `#` comments and a header
-/// row in this order are skipped. Throws Error (kind input) with file and line for anything else.
+/// row in this order are skipped; another header is refused if there are no rows. Throws Error
+/// (kind input) with file and line for anything else.
 std::vector<PlaceRun> read_place_runs(const std::string& path);
 
 /// Reads the frame at the start of each row; text after a comma is a remark. Errors as above.
@@ -43,7 +44,8 @@ void check_every(int every);
 /// a frame that was read are lost; GroundTruth::every keeps them. Throws as check_every() does.
 GroundTruth every_nth(const GroundTruth& truth, int every);
 
-/// Writes a comment line and rows of `query,first,last`. Throws Error (kind output).
+/// Writes a comment line and rows of `query,first,last`, or their header if there are none. Throws
+/// Error (kind output).
 void write_place_runs(const std::string& path, const std::string& comment,
                       const std::vector<PlaceRun>& runs);
 

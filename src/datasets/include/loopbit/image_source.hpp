@@ -55,7 +55,7 @@ inline constexpr int kMaxMegapixels = 100;
 ///  - any other folder: its images in natural order (2.png before 10.png), told by extension;
 ///    hidden files and sub-folders are passed over;
 ///  - a .txt or .csv file: a list, one image a line, relative to the file or to a folder `images`
-///    beside it, `#` for comments;
+///    beside it, `#` for comments; or names that NUL bytes end, as `find -print0` writes them;
 ///  - an image file: that one image;
 ///  - any other file: a video, its times counted from its first frame.
 /// Throws Error (kind input) if nothing is there, no image is found or a list is malformed, and

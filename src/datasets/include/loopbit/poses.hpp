@@ -49,8 +49,10 @@ std::vector<std::optional<cv::Vec3d>> read_positions(
     const std::string& path, const std::vector<std::optional<double>>& times_s, int every = 1);
 
 /// Throws what read_positions() would, as far as can be told before the frames are read, of which
-/// there will be `frames` if that is known.
-void check_poses(const std::string& path, std::optional<std::size_t> frames, int every = 1);
+/// there will be `frames` if that is known; and, where these are `all_read`, that the sequence does
+/// not have as many frames as the file has rows, see TruthOptions.
+void check_poses(const std::string& path, std::optional<std::size_t> frames, int every = 1,
+                 bool all_read = false);
 
 /// The rule by which two frames with known poses show the same place.
 struct PoseTruthOptions {
@@ -80,7 +82,8 @@ struct PoseTruthOptions {
 /// has those within the grey radius, whatever their heading, gap or path (and all of same_place).
 /// Frames without a pose are unknown. The path is measured between frames with poses. Throws Error
 /// (kind option) for an option out of range, (kind input) for a position that is not finite or over
-/// 1e9 m. Cost: grows with the pairs within reach, not with the square of the frames.
+/// 1e9 m. Cost: grows with the runs of places within reach, not with their frames: a camera that
+/// stands still costs little.
 GroundTruth truth_from_poses(const std::vector<std::optional<CameraPose>>& poses,
                              const PoseTruthOptions& options = {});
 

@@ -24,9 +24,10 @@ TruthKind truth_kind(const std::string& path);
 /// How to interpret a file of ground truth if its kind leaves that open.
 struct TruthOptions {
   PoseTruthOptions poses;
-  std::string variable;  ///< of a .mat file; empty = the only square matrix in it
-  int views = 1;         ///< a matrix has so many rows a frame in turn (2: left, right)
-  int every = 1;         ///< of the sequence's frames every so-many-th was read
+  std::string variable;   ///< of a .mat file; empty = the only square matrix in it
+  int views = 1;          ///< a matrix has so many rows a frame in turn (2: left, right)
+  int every = 1;          ///< of the sequence's frames every so-many-th was read
+  bool all_read = false;  ///< of the frames read, that the sequence has none after them
 };
 
 /// Reads the ground truth of a sequence. The kind of the file is detected:
@@ -49,9 +50,12 @@ struct TruthOptions {
 /// `times_s`: the times of the frames read, one a frame, where they are known (0 frames = not
 /// known). A trajectory goes by time where any frame has one, and by number, a row a frame of the
 /// whole sequence, where they are known to have none: then the trajectory must have one for each
-/// frame. Other rows may be more than frames, of a run that ended early, never fewer.
-/// Throws Error (kind input) that names file, fault and remedy. A 4541 x 4541 matrix takes well
-/// under a second.
+/// frame. Other rows are never fewer than frames. They may be more, as of a run that ended early,
+/// unless `all_read`, which also refuses later frames in a list.
+///
+/// Truth without a true place is refused, unless it is by poses, or a list of no rows that names
+/// its columns. Throws Error (kind input) that names file, fault and remedy. A 4541 x 4541 matrix
+/// takes well under a second.
 GroundTruth read_truth(const std::string& path, const TruthOptions& options = {},
                        const std::vector<std::optional<double>>& times_s = {});
 
