@@ -85,6 +85,22 @@ def signalled_run(case):
     case.expect(listed[-1]["frames"] == len(rows(out)), "the map has not the frames of the run")
 
 
+@attack(1)
+def signalled_watch(case):
+    """A signal ends a query that waits for images, which is what it is told to do."""
+    folder = case.folder / "watched"
+    folder.mkdir()
+    shutil.copy(case.material.images / "000003.png", folder)
+    process = case.start("query", case.material.map, "--watch", folder, "--json")
+    while process.poll() is None and not os.fstat(process.streams[0].fileno()).st_size:
+        time.sleep(0.002)
+    case.about = case.pick(["SIGHUP", "SIGINT", "SIGTERM"])
+    process.send_signal(getattr(signal, case.about))
+    ended = case.finish(process)
+    case.judge(ended, (0, 130))
+    case.expect(len(ended.out.splitlines()) == 1 and json.loads(ended.out), "its answer is lost")
+
+
 @contextlib.contextmanager
 def disk(case, kilobytes):
     """A disk of its own, in memory."""
@@ -135,8 +151,8 @@ def file_limit(case):
         "report", material.run, "--out", new], ["map", "export", path, "--out", new], [
         "map", "merge", new, path], ["map", "merge", path, material.other_map], [
         "map", "compact", path, "--drop", 1], ["map", "check", path, "--recover", new], [
-        "map", "images", path, "--out", new], ["demo", "--frames", 2, *TINY, "--write-images", new]])
-    size = int(10 ** case.random.uniform(0, 6.5))
+        "map", "images", path, "--out", new], ["demo", *TINY, "--write-images", new]])
+    size = int(10 ** case.random.uniform(3.6, 6.5))  # messages are longer than nothing, too
     ran = case.loopbit(*command, codes=(0, 4), limits=[(resource.RLIMIT_FSIZE, size)])
     if command[:2] != ["map", "compact"] or ran.code:
         check_saved(case, path)

@@ -69,7 +69,7 @@ def places_of_a_file(case, special):
         "compare": ["compare", material.run, special, "--truth", material.truth],
         "reported": ["report", special], "page": ["report", material.run, "--out", special],
         "reproduce": ["reproduce", special, "--out", out],
-        "town": ["demo", "--frames", 2, *TINY, "--write-images", special],
+        "town": ["demo", *TINY, "--write-images", special],
     }
 
 

@@ -15,9 +15,9 @@ from harness import decisions
 
 FRAMES = 24
 WIDTH, HEIGHT = 320, 240
-# A drive of two frames.
-TINY = ["--world", "laps=1", "--world", "spacing_m=60", "--world", "width_px=64", "--world",
-        "height_px=64"]
+# A drive that is quickly drawn.
+TINY = ["--frames", 6, "--world", "laps=1", "--world", "spacing_m=19", "--world", "width_px=64",
+        "--world", "height_px=64"]
 REPOSITORY = pathlib.Path(__file__).resolve().parents[2]
 CORPUS = REPOSITORY / "fuzz" / "corpus"
 

@@ -129,7 +129,7 @@ def damaged_log(case):
     file = log_of(path) if case.number % 4 else path
     file.write_bytes(damaged(file.read_bytes(), case.random))
     case.loopbit("map", "check", path, codes=(0, 3))
-    new = case.folder / "new.db"
+    new = case.folder / "recovered.db"
     if case.loopbit("map", "check", path, "--recover", new, codes=(0, 3)).code == 0:
         case.expect(all(saved.get(key) == place for key, place in map_rows(new).items()),
                     "a recovered place is not what was saved")
