@@ -6,7 +6,7 @@
     attack.py LOOPBIT MAP_CRASH MODULE FINDINGS [TRIES [SEED [NAME[:NUMBER] ...]]]
 
 Prints a line 'attack NAME tries=N faults=N' for each attack and one for all. A try with a fault
-leaves its folder in FINDINGS; NAME:NUMBER repeats it alone. The exit code is 1 if there was a fault.
+leaves its folder in FINDINGS; NAME:NUMBER repeats it alone. Exit code 1: there was a fault.
 """
 
 import concurrent.futures
@@ -65,22 +65,22 @@ def plan(tries, names):
 
 
 def main():
-    if len(sys.argv) < 5:
+    if len(sys.argv) < 4:  # loopbit_command.py has taken the first
         sys.exit(__doc__)
-    loopbit, map_crash, module, findings = (pathlib.Path(p).resolve() for p in sys.argv[1:5])
-    tries = int(sys.argv[5]) if len(sys.argv) > 5 else 3000
-    seed = int(sys.argv[6]) if len(sys.argv) > 6 else 2019
+    map_crash, module, findings = (pathlib.Path(path).resolve() for path in sys.argv[1:4])
+    tries = int(sys.argv[4]) if len(sys.argv) > 4 else 3000
+    seed = int(sys.argv[5]) if len(sys.argv) > 5 else 2019
     begun = time.monotonic()
     shutil.rmtree(findings, ignore_errors=True)
     findings.mkdir(parents=True)
     with tempfile.TemporaryDirectory(prefix="loopbit_attack_") as folder:
         folder = pathlib.Path(folder)
-        material = Material(loopbit, map_crash, module, folder / "material").make()
+        material = Material(map_crash, module, folder / "material").make()
         scratch = folder / "tries"
         scratch.mkdir()
         with concurrent.futures.ProcessPoolExecutor() as workers:
             running = {one: workers.submit(one_try, *one, seed, material, scratch, findings)
-                       for one in plan(tries, sys.argv[7:])}
+                       for one in plan(tries, sys.argv[6:])}
             results = {one: result.result() for one, result in running.items()}
     return report(results, time.monotonic() - begun)
 

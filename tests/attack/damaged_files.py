@@ -162,8 +162,9 @@ def map(path):
     reader.places(), reader.loops(), reader.check_structure()
 def frames(path):
     for frame in loopbit.open_source(path): pass
-for read in (loopbit.read_match_list, loopbit.read_truth, loopbit.load_options, map, loopbit.check_map, frames,
-             loopbit.truth_kind, lambda path: loopbit.read_positions(path, [None] * 24)):
+def positions(path): loopbit.read_positions(path, [None] * 24)
+for read in (loopbit.read_match_list, loopbit.read_truth, loopbit.load_options, loopbit.check_map,
+             loopbit.truth_kind, map, frames, positions):
     try: read(path)
     except loopbit.Error as error: assert str(error).endswith("."), error
 """

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: MIT
 """Runs commands within limits, and writes down what no command may do."""
 
-import csv
 import hashlib
 import os
 import pathlib
@@ -10,7 +9,11 @@ import random
 import re
 import resource
 import subprocess
+import sys
 import time
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+from loopbit_command import LOOPBIT, decisions, rows  # noqa: E402, takes the command's path
 
 DOCUMENTED_CODES = (0, 2, 3, 4, 130)
 MAX_SECONDS = 60  # of the clock: a hang
@@ -54,23 +57,14 @@ def contents(path):
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else None
 
 
-def rows(folder):
-    with open(pathlib.Path(folder) / "loops.csv", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def decisions(folder):
-    """loops.csv without the times, which differ from run to run."""
-    return [{k: v for k, v in row.items() if not k.endswith("_ms")} for row in rows(folder)]
-
-
 class Try:
-    """One try of an attack: a scratch folder, a random generator of its own, and the faults seen."""
+    """One try of an attack: a scratch folder, random numbers of its own, and the faults seen."""
 
     def __init__(self, name, number, seed, material, folder):
         self.number, self.material, self.folder = number, material, folder
         self.random = random.Random(f"{seed} {name} {number}")
-        self.faults, self.about = [], ""  # about: what was tried, where the name does not say it
+        self.faults = []
+        self.about = ""  # what was tried, where the attack's name does not say it
 
     def fault(self, text):
         self.faults.append(text)
@@ -93,9 +87,8 @@ class Try:
             if cores:
                 os.sched_setaffinity(0, cores)
 
-        command = [program or self.material.loopbit, *arguments]
-        command = [os.fsencode(os.fspath(a) if hasattr(a, "__fspath__") else str(a))
-                   for a in command]
+        command = [program or LOOPBIT, *arguments]
+        command = [os.fsencode(a if isinstance(a, os.PathLike) else str(a)) for a in command]
         number = len(list(self.folder.glob("stdout*")))
         streams = [open(self.folder / f"{name}{number}", "w+b") for name in ("stdout", "stderr")]
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=streams[0],
@@ -175,6 +168,6 @@ class Try:
 
 def decided_alike(case, folder, reference, words):
     """True if a run decided what the undisturbed one did, as far as it came."""
-    found = decisions(folder)
+    found = decisions(pathlib.Path(folder))
     return case.expect(found == reference[:len(found)], f"{words}: rows differ from those of a run "
                                                         f"that nothing disturbed")

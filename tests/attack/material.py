@@ -11,7 +11,7 @@ import sys
 import time
 import zlib
 
-from harness import decisions
+from harness import LOOPBIT, decisions
 
 FRAMES = 24
 WIDTH, HEIGHT = 320, 240
@@ -25,8 +25,8 @@ CORPUS = REPOSITORY / "fuzz" / "corpus"
 class Material:
     """Made once, by the command itself; tries copy from it."""
 
-    def __init__(self, loopbit, map_crash, module, folder):
-        self.loopbit, self.map_crash, self.module = loopbit, map_crash, module
+    def __init__(self, map_crash, module, folder):
+        self.map_crash, self.module = map_crash, module
         self.folder = folder
         folder.mkdir()
         self.town = folder / "town"
@@ -39,7 +39,7 @@ class Material:
         self.formats = folder / "formats"
 
     def command(self, *arguments):
-        subprocess.run([self.loopbit, *map(str, arguments)], check=True,
+        subprocess.run([LOOPBIT, *map(str, arguments)], check=True,
                        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
 
     def make(self):
@@ -179,7 +179,7 @@ def map_rows(path):
 
 
 def python(case, script, *arguments, **options):
-    """Runs a program with the Python module, whose Error it may meet; begins it, as start() does."""
+    """Begins a program that has the Python module, as Try.start() does."""
     return case.start("-c", script, *arguments, program=sys.executable,
                       environment={"PYTHONPATH": str(case.material.module),
                                    "PYTHONDONTWRITEBYTECODE": "1"}, **options)

@@ -9,7 +9,7 @@ import time
 
 from damaged_files import use_map
 from disturbed_runs import check_saved
-from harness import Skipped, attack, contents
+from harness import LOOPBIT, Skipped, attack, contents
 from material import damaged, map_rows, python
 
 HOLD = """
@@ -85,7 +85,7 @@ def two_names(case):
         if case.about == "bind_mount":
             ran = case.finish(case.start(
                 "-m", "sh", "-c", 'mount --bind "$1" "$2" && shift 2 && exec "$@"', "sh", path,
-                other, case.material.loopbit, *command, program="unshare"))
+                other, LOOPBIT, *command, program="unshare"))
             case.expect(ran.code == 4, f"{command[:2]}: exit code {ran.code}: {ran.text}")
         else:
             case.loopbit(*command, codes=(4,))
