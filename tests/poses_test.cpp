@@ -18,13 +18,13 @@ namespace {
 using Poses = std::vector<std::optional<CameraPose>>;
 using Pairs = std::set<std::pair<int, int>>;
 
-constexpr double kDegree = CV_PI / 180;
+constexpr double kDeg = CV_PI / 180;
 
 CameraPose pose_at(double x, double z, double heading_deg = 0) {
-  return {{}, {x, 0, z}, {std::sin(heading_deg * kDegree), 0, std::cos(heading_deg * kDegree)}};
+  return {{}, {x, 0, z}, {std::sin(heading_deg * kDeg), 0, std::cos(heading_deg * kDeg)}};
 }
 
-Pairs pairs_of(const std::vector<PlaceRun>& runs) {
+Pairs expanded(const std::vector<PlaceRun>& runs) {
   Pairs pairs;
   for (const PlaceRun& run : runs) {
     for (int place = run.first; place <= run.last; ++place) {
@@ -59,7 +59,7 @@ Truth brute_force(const Poses& poses, const PoseTruthOptions& options) {
       const double cosine = std::clamp(poses[q]->ahead.dot(poses[p]->ahead), -1.0, 1.0);
       const bool same =
           distance_m <= options.radius_m && pair.first - pair.second > options.min_gap_frames &&
-          path_m >= options.min_path_m && std::acos(cosine) / kDegree <= options.max_heading_deg;
+          path_m >= options.min_path_m && std::acos(cosine) / kDeg <= options.max_heading_deg;
       if (same) truth.same.insert(pair);
       const bool grey = options.grey_radius_m > 0;
       if (grey && (same || distance_m <= options.grey_radius_m)) truth.near.insert(pair);
@@ -72,8 +72,8 @@ void expect_brute_force(const Poses& poses, const PoseTruthOptions& options) {
   const GroundTruth truth = truth_from_poses(poses, options);
   const Truth expected = brute_force(poses, options);
   EXPECT_FALSE(expected.same.empty()) << "this test shows nothing";
-  EXPECT_EQ(pairs_of(truth.same_place), expected.same);
-  EXPECT_EQ(pairs_of(truth.near_place), expected.near);
+  EXPECT_EQ(expanded(truth.same_place), expected.same);
+  EXPECT_EQ(expanded(truth.near_place), expected.near);
   EXPECT_EQ(truth.unknown, expected.unknown);
 }
 
