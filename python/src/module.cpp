@@ -3,7 +3,7 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <pybind11/pybind11.h>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/version.hpp"
 
 #include "bindings.hpp"
@@ -19,7 +19,7 @@ PYBIND11_MODULE(_loopbit, module) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   python::bind_errors(module);
   module.def(
-      "active_kernel", [] { return std::string(loopbit::active_kernels().name); },
+      "active_kernel", [] { return to_string(loopbit::active_instruction_set()); },
       "The instruction set whose inner loops run: scalar, avx2, avx512 or, on Arm, dotprod; "
       "LOOPBIT_KERNEL forces one.");
   python::bind_options(module);

@@ -2,16 +2,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <tuple>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/descriptor.hpp"
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/options.hpp"
 
 namespace loopbit {
@@ -23,9 +22,6 @@ struct Keypoint {
   float scale = 0;      ///< sigma in px: a 9 x 9 box filter has 1.2
   float angle_rad = 0;  ///< 0 where features are upright
 };
-
-/// A unit-length SURF descriptor, 64 values, times 127 / 0.5 and rounded; larger ones are cut off.
-using Descriptor = std::array<std::int8_t, 64>;
 
 /// However narrow an image is, its longer side is scaled to no more than this.
 inline constexpr int kMaxWorkingSide_px = 16384;
@@ -63,7 +59,7 @@ class SurfExtractor {
  public:
   /// Throws Error (kind option) if `options` are not valid.
   explicit SurfExtractor(const SurfOptions& options = {},
-                         const Kernels& kernels = active_kernels());
+                         InstructionSet instruction_set = active_instruction_set());
   ~SurfExtractor();
   SurfExtractor(const SurfExtractor&) = delete;
   SurfExtractor& operator=(const SurfExtractor&) = delete;
@@ -84,7 +80,7 @@ class SurfExtractor {
 /// Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 2008. The budget of keypoints
 /// decides: the strongest are kept, of which a cell of a grid may hold three times its share. What
 /// 8 bits cannot tell from noise is left out, so dim images have fewer. The same image gives the
-/// same bits with every kernel. Cost: see scripts/bench_surf.
+/// same bits with every instruction set. Cost: see scripts/bench_surf.
 Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options = {});
 
 }  // namespace loopbit
