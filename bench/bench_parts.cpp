@@ -3,13 +3,14 @@
 // What each part costs, on frames of the built-in world. Compare rows of one run with each other:
 // kernels against the scalar one, bytes_per_second against the machine's bandwidth.
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include <benchmark/benchmark.h>
 
 #include "loopbit/binary_content.hpp"
 #include "loopbit/gray_image.hpp"
-#include "loopbit/kernels.hpp"
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/place_index.hpp"
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
@@ -44,24 +45,23 @@ void bm_binary_content(benchmark::State& state) {
 }
 BENCHMARK(bm_binary_content)->Unit(benchmark::kMicrosecond);
 
-/// A full scan with five shifts, by each kernel this processor runs.
+/// A full scan with five shifts, by each instruction set of this processor.
 void bm_max_overlaps(benchmark::State& state) {
-  const Kernels& kernels = *available_kernels()[static_cast<std::size_t>(state.range(0))];
+  const InstructionSet set = available_instruction_sets()[static_cast<std::size_t>(state.range(0))];
   constexpr std::size_t kPlaces = 10'000;
   constexpr std::size_t kShifts = 5;
   const auto contents = drive(kPlaces);
   std::vector<std::uint16_t> overlaps(kPlaces);
   for (auto _ : state) {
-    kernels.max_overlaps(contents.front().rows.data(), kShifts, contents.front().rows.data(),
-                         kPlaces, overlaps.data());
+    max_overlaps(std::span(contents).first(kShifts), contents, overlaps, set);
     benchmark::DoNotOptimize(overlaps.data());
   }
-  state.SetLabel(std::string(kernels.name));
+  state.SetLabel(std::string(to_string(set)));
   state.SetBytesProcessed(state.iterations() *
                           static_cast<std::int64_t>(kPlaces * sizeof(BinaryContent)));
 }
 BENCHMARK(bm_max_overlaps)
-    ->DenseRange(0, static_cast<std::int64_t>(available_kernels().size()) - 1)
+    ->DenseRange(0, static_cast<std::int64_t>(available_instruction_sets().size()) - 1)
     ->Unit(benchmark::kMicrosecond);
 
 void bm_query(benchmark::State& state) {

@@ -17,7 +17,7 @@
 #include <fmt/core.h>
 #include <opencv2/core.hpp>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/place_index.hpp"
 
 #include "long_sequence.hpp"
@@ -129,8 +129,7 @@ double full_scan_ms(const PlaceIndex& index, const std::vector<BinaryContent>& q
     for (PlaceId place = 0; place < index.size(); ++place) {
       std::uint16_t overlap = 0;
       const BinaryContent& content = index.content(place);
-      active_kernels().max_overlaps(shifted.front().rows.data(), shifted.size(),
-                                    content.rows.data(), 1, &overlap);
+      max_overlaps(shifted, std::span(&content, 1), std::span(&overlap, 1));
       best = std::max(best, static_cast<double>(overlap));
     }
     times.push_back(thread_ms() - start_ms);

@@ -18,7 +18,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "loopbit/image_source.hpp"
-#include "loopbit/kernels.hpp"
+#include "loopbit/kernels_for.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
@@ -26,6 +26,7 @@
 #include "hessian_pyramid.hpp"
 #include "integral_image.hpp"
 #include "patch.hpp"
+#include "surf_kernels.hpp"
 #include "surf_peers.hpp"
 #include "surf_quality.hpp"
 
@@ -84,10 +85,11 @@ void print_part(const char* name, double ms, double bound_ms, const char* bound)
 
 /// The time of each part beside the least it could take.
 void print_parts(const cv::Mat1b& image, const Machine& machine) {
-  const Kernels& kernels = active_kernels();
+  const InstructionSet set = active_instruction_set();
+  const auto& kernels = kernels_for<SurfKernels>(set);
   const double pixels = image.size().area();
-  const bool wide = kernels.name == "avx512";
-  const double lanes = wide ? 16 : kernels.name == "avx2" ? 8 : 4;
+  const bool wide = set == InstructionSet::avx512;
+  const double lanes = wide ? 16 : set == InstructionSet::avx2 ? 8 : 4;
   IntegralImage integral;
   HessianPyramid pyramid;
   std::vector<Maximum> maxima;
@@ -112,7 +114,7 @@ void print_parts(const cv::Mat1b& image, const Machine& machine) {
   const double samples = pixels / 4 * 5.75;
   const auto blobs = static_cast<double>(features.keypoints.size());
   fmt::print("Parts at {} x {}, {} keypoints, {} kernels     ms   bound ms   bound by\n",
-             image.cols, image.rows, features.keypoints.size(), kernels.name);
+             image.cols, image.rows, features.keypoints.size(), to_string(set));
   print_part("integral image", integral_ms, pixels / 2 / machine.cycles_per_ms,
              "one addition for two pixels, in a chain");
   print_part("Hessian", pyramid_ms, samples * 30 / lanes / 2 / machine.cycles_per_ms,
@@ -163,12 +165,12 @@ double match_500_ms(const cv::Mat1b& first, const cv::Mat1b& second) {
   const Features query = extract_surf(first, options);
   const Features place = extract_surf(second, options);
   double best_ms = 0;
-  for (const Kernels* kernels : available_kernels()) {
-    Verifier verifier({}, *kernels);
+  for (const InstructionSet set : available_instruction_sets()) {
+    Verifier verifier({}, set);
     Verification result;
     best_ms = median_ms(199, [&] { verifier.match(query, place, result); });
     fmt::print("{} x {} descriptors, {} kernels: {:.4f} ms, {} matches\n", query.descriptors.size(),
-               place.descriptors.size(), kernels->name, best_ms, result.matches.size());
+               place.descriptors.size(), to_string(set), best_ms, result.matches.size());
   }
   return best_ms;
 }

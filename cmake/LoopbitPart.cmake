@@ -13,7 +13,8 @@ function(loopbit_part name)
     ${target}
     PUBLIC ${PART_LINKS}
     PRIVATE ${PART_PRIVATE_LINKS} loopbit_warnings)
-  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON
+                                             LOOPBIT_OBJECTS $<TARGET_OBJECTS:${target}>)
   loopbit_export_only_public(${target} "${PART_HEADERS}")
   list(TRANSFORM PART_HEADERS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/include/loopbit/)
   install(FILES ${PART_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbit COMPONENT dev)

@@ -153,9 +153,12 @@ def main():
     stamps = build / "tidy"
     stamps.mkdir(exist_ok=True)
 
-    todo, pending, passed = {}, {}, set()
+    todo, pending, passed, seen = {}, {}, set(), set()
     for entry in entries_of(build):
         source = pathlib.Path(entry["file"])
+        if source in seen:
+            continue  # compiled for several instruction sets, of which one is checked
+        seen.add(source)
         if not is_ours(source) or source.is_relative_to(build):
             continue
         if not arguments.all and not source.is_relative_to(ROOT / "src"):

@@ -10,9 +10,10 @@
 namespace loopbit::test {
 namespace {
 
-cv::Mat1b shrunk(const cv::Mat1b& gray, cv::Size size, const Kernels& kernels = active_kernels()) {
+cv::Mat1b shrunk(const cv::Mat1b& gray, cv::Size size,
+                 InstructionSet set = active_instruction_set()) {
   cv::Mat1b small;
-  ImageShrinker(kernels).shrink(gray, size, small);
+  ImageShrinker(set).shrink(gray, size, small);
   return small;
 }
 
@@ -30,9 +31,9 @@ TEST(ImageShrinker, UpTo256PartsAreExact) {
        {Sizes{{64, 64}, {64, 64}}, Sizes{{65, 127}, {64, 64}}, Sizes{{640, 480}, {256, 192}},
         Sizes{{801, 333}, {17, 250}}, Sizes{{1000, 40}, {1, 1}}, Sizes{{300, 70}, {256, 1}}}) {
     const cv::Mat1b gray = textured_image(from, 9);
-    for (const Kernels* kernels : available_kernels()) {
-      EXPECT_EQ(largest_difference(shrunk(gray, to, *kernels), area_means(gray, to)), 0)
-          << from << " to " << to << ", " << kernels->name;
+    for (const InstructionSet set : available_instruction_sets()) {
+      EXPECT_EQ(largest_difference(shrunk(gray, to, set), area_means(gray, to)), 0)
+          << from << " to " << to << ", " << to_string(set);
     }
   }
 }

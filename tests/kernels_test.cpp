@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "loopbit/kernels.hpp"
-
+// The inner loops of every instruction set against slow code and against the scalar ones.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -13,6 +12,12 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
+#include "loopbit/kernels_for.hpp"
+
+#include "bound_kernels.hpp"
+#include "epipolar_kernels.hpp"
+#include "match_kernels.hpp"
+#include "overlap_kernels.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
@@ -21,7 +26,7 @@ namespace {
 using Words = std::vector<std::uint64_t>;
 using Bytes = std::vector<std::int8_t>;
 
-const Kernels& scalar() { return *available_kernels().front(); }
+constexpr InstructionSet kScalar = InstructionSet::scalar;
 
 Words random_words(Random& random, std::size_t contents) {
   Words words(contents * kContentWords);
@@ -62,11 +67,11 @@ Bytes random_regular_bytes(Random& random, std::size_t descriptors) {
   return bytes;
 }
 
-std::vector<std::uint16_t> max_overlaps(const Kernels& kernels, const Words& queries,
+std::vector<std::uint16_t> max_overlaps(InstructionSet set, const Words& queries,
                                         const Words& places) {
   std::vector<std::uint16_t> overlaps(places.size() / kContentWords, 9999);
-  kernels.max_overlaps(queries.data(), queries.size() / kContentWords, places.data(),
-                       overlaps.size(), overlaps.data());
+  kernels_for<OverlapKernels>(set).max_overlaps(queries.data(), queries.size() / kContentWords,
+                                                places.data(), overlaps.size(), overlaps.data());
   return overlaps;
 }
 
@@ -79,12 +84,13 @@ struct Neighbours {
 };
 
 /// Of kMatchLanes descriptors among `others`.
-Neighbours nearest_two(const Kernels& kernels, const std::int8_t* descriptors,
+Neighbours nearest_two(InstructionSet set, const std::int8_t* descriptors,
                        const std::int8_t* others, std::size_t num_others) {
   std::vector<std::int32_t> constants(num_others + 1);
-  kernels.describe_constants(others, num_others, constants.data());
+  kernels_for<MatchKernels>(set).describe_constants(others, num_others, constants.data());
   NearestTwo nearest;
-  kernels.nearest_two(descriptors, others, constants.data(), num_others, nearest);
+  kernels_for<MatchKernels>(set).nearest_two(descriptors, others, constants.data(), num_others,
+                                             nearest);
   Neighbours neighbours;
   std::copy_n(nearest.index, kMatchLanes, neighbours.index.begin());
   std::copy_n(nearest.distance_sq, kMatchLanes, neighbours.distance_sq.begin());
@@ -92,8 +98,8 @@ Neighbours nearest_two(const Kernels& kernels, const std::int8_t* descriptors,
   return neighbours;
 }
 
-Neighbours nearest_two(const Kernels& kernels, const Bytes& descriptors, const Bytes& others) {
-  return nearest_two(kernels, descriptors.data(), others.data(), others.size() / kDescriptorSize);
+Neighbours nearest_two(InstructionSet set, const Bytes& descriptors, const Bytes& others) {
+  return nearest_two(set, descriptors.data(), others.data(), others.size() / kDescriptorSize);
 }
 
 std::int32_t distance_sq(const std::int8_t* a, const std::int8_t* b) {
@@ -170,7 +176,7 @@ Counts packed(Counts& records) {
 }
 
 /// What reaching_queries finds, from its definition; `records` are one after the other.
-void expect_reaching_queries(const Kernels& kernels, const Counts& queries,
+void expect_reaching_queries(InstructionSet set, const Counts& queries,
                              const std::vector<std::uint16_t>& among, Counts records,
                              const std::vector<std::uint16_t>& least) {
   const std::size_t num_records = records.size() / kBlockCounts;
@@ -178,8 +184,8 @@ void expect_reaching_queries(const Kernels& kernels, const Counts& queries,
   std::vector<const std::uint8_t*> addresses(num_records);
   for (std::size_t i = 0; i < num_records; ++i) addresses[i] = &all_packed[i * kPackedBytes];
   std::vector<Reached> reached(num_records, {9999, 9999});
-  kernels.reaching_queries(queries.data(), among.data(), addresses.data(), num_records,
-                           least.data(), reached.data());
+  kernels_for<BoundKernels>(set).reaching_queries(queries.data(), among.data(), addresses.data(),
+                                                  num_records, least.data(), reached.data());
   for (std::size_t i = 0; i < num_records; ++i) {
     int expected_largest = 0;
     unsigned expected = 0;
@@ -195,14 +201,14 @@ void expect_reaching_queries(const Kernels& kernels, const Counts& queries,
 }
 
 /// What coarse_sums finds, from its definition; `records` are one after the other.
-void expect_coarse_sums(const Kernels& kernels, const Counts& queries, const Counts& records) {
+void expect_coarse_sums(InstructionSet set, const Counts& queries, const Counts& records) {
   const std::size_t num_queries = queries.size() / kCoarseCounts;
   const std::size_t num_records = records.size() / kCoarseCounts;
   std::vector<std::uint16_t> sums(num_queries * num_records, 9999);
   std::vector<std::uint16_t> largest(num_records / kInterleaved, 9999);
   const Counts groups = interleaved(records, kCoarseCounts, kInterleaved, kCountsAtOnce);
-  kernels.coarse_sums(queries.data(), num_queries, groups.data(), largest.size(), sums.data(),
-                      largest.data());
+  kernels_for<BoundKernels>(set).coarse_sums(queries.data(), num_queries, groups.data(),
+                                             largest.size(), sums.data(), largest.data());
   std::vector<std::uint16_t> expected_largest(largest.size());
   for (std::size_t i = 0; i < num_records; ++i) {
     const std::size_t group = i / kInterleaved;
@@ -242,13 +248,13 @@ SumsOfRecords random_sums(Random& random, std::size_t num_queries, std::size_t n
 }
 
 /// What select_records finds, from its definition.
-void expect_selected(const Kernels& kernels, const SumsOfRecords& records, Selection selection) {
+void expect_selected(InstructionSet set, const SumsOfRecords& records, Selection selection) {
   selection.smallest_counts = records.smallest_counts.data();
   const std::size_t num_records = records.smallest_counts.size();
   std::vector<Selected> selected(num_records);
-  selected.resize(kernels.select_records(records.sums.data(), records.largest.data(),
-                                         records.num_queries, records.largest.size(), selection,
-                                         selected.data()));
+  selected.resize(kernels_for<BoundKernels>(set).select_records(
+      records.sums.data(), records.largest.data(), records.num_queries, records.largest.size(),
+      selection, selected.data()));
   auto found = selected.begin();
   for (std::size_t i = 0; i < num_records; ++i) {
     const int larger = std::max(selection.query_count, records.smallest_counts[i]);
@@ -314,7 +320,7 @@ double sampson_sq(const std::array<float, 9>& model, const PointPairs& pairs, st
   return error * error / (fp[0] * fp[0] + fp[1] * fp[1] + fq[0] * fq[0] + fq[1] * fq[1]);
 }
 
-class EveryKernel : public testing::TestWithParam<const Kernels*> {};
+class EveryKernel : public testing::TestWithParam<InstructionSet> {};
 
 TEST_P(EveryKernel, CountsTheOverlapOfOneBit) {
   for (std::size_t word = 0; word < kContentWords; ++word) {
@@ -322,7 +328,7 @@ TEST_P(EveryKernel, CountsTheOverlapOfOneBit) {
       Words content(kContentWords, 0);
       content[word] = std::uint64_t{1} << bit;
       const Words full(kContentWords, ~std::uint64_t{0});
-      ASSERT_EQ(max_overlaps(*GetParam(), content, full).front(), 1) << word << ' ' << bit;
+      ASSERT_EQ(max_overlaps(GetParam(), content, full).front(), 1) << word << ' ' << bit;
     }
   }
 }
@@ -335,9 +341,9 @@ TEST_P(EveryKernel, FindsTheLargestOverlapOfSeveralQueries) {
   queries.insert(queries.end(), empty.begin(), empty.end());
   Words places = full;
   places.insert(places.end(), empty.begin(), empty.end());
-  EXPECT_EQ(max_overlaps(*GetParam(), queries, places), (std::vector<std::uint16_t>{4096, 0}));
-  EXPECT_EQ(max_overlaps(*GetParam(), {}, places), (std::vector<std::uint16_t>{0, 0}));
-  EXPECT_TRUE(max_overlaps(*GetParam(), queries, {}).empty());
+  EXPECT_EQ(max_overlaps(GetParam(), queries, places), (std::vector<std::uint16_t>{4096, 0}));
+  EXPECT_EQ(max_overlaps(GetParam(), {}, places), (std::vector<std::uint16_t>{0, 0}));
+  EXPECT_TRUE(max_overlaps(GetParam(), queries, {}).empty());
 }
 
 TEST_P(EveryKernel, OverlapsEqualTheScalarOnes) {
@@ -346,7 +352,7 @@ TEST_P(EveryKernel, OverlapsEqualTheScalarOnes) {
     for (const std::size_t num_places : {1U, 2U, 3U, 7U, 8U, 33U, 100U}) {
       const Words queries = random_words(random, num_queries);
       const Words places = random_words(random, num_places);
-      ASSERT_EQ(max_overlaps(*GetParam(), queries, places), max_overlaps(scalar(), queries, places))
+      ASSERT_EQ(max_overlaps(GetParam(), queries, places), max_overlaps(kScalar, queries, places))
           << num_queries << " queries, " << num_places << " places";
     }
   }
@@ -359,9 +365,10 @@ TEST_P(EveryKernel, ReadsContentsAtAnyWord) {
   for (std::size_t shift = 0; shift < 8; ++shift) {
     std::array<std::uint16_t, 5> overlaps{};
     std::array<std::uint16_t, 5> expected{};
-    GetParam()->max_overlaps(queries.data() + shift, 3, places.data() + 8 - shift, 5,
-                             overlaps.data());
-    scalar().max_overlaps(queries.data() + shift, 3, places.data() + 8 - shift, 5, expected.data());
+    kernels_for<OverlapKernels>(GetParam())
+        .max_overlaps(queries.data() + shift, 3, places.data() + 8 - shift, 5, overlaps.data());
+    kernels_for<OverlapKernels>(kScalar).max_overlaps(
+        queries.data() + shift, 3, places.data() + 8 - shift, 5, expected.data());
     EXPECT_EQ(overlaps, expected) << "from word " << shift;
   }
 }
@@ -372,7 +379,7 @@ TEST_P(EveryKernel, FindsTheNearestTwoAmongAnyNumber) {
        {1U, 2U, 3U, 4U, 5U, 7U, 8U, 12U, 31U, 64U, 256U, 257U, 601U}) {
     const Bytes descriptors = random_bytes(random, kMatchLanes);
     const Bytes others = random_bytes(random, num_others);
-    ASSERT_EQ(nearest_two(*GetParam(), descriptors, others),
+    ASSERT_EQ(nearest_two(GetParam(), descriptors, others),
               expected_neighbours(descriptors, others))
         << num_others << " others";
   }
@@ -384,7 +391,7 @@ TEST_P(EveryKernel, FindsTheNearestTwoOfRegularDescriptors) {
     const Bytes descriptors = random_regular_bytes(random, kMatchLanes);
     Bytes others = random_regular_bytes(random, num_others);
     std::copy_n(descriptors.begin(), kDescriptorSize, others.end() - kDescriptorSize);
-    ASSERT_EQ(nearest_two(*GetParam(), descriptors, others),
+    ASSERT_EQ(nearest_two(GetParam(), descriptors, others),
               expected_neighbours(descriptors, others))
         << num_others << " others";
   }
@@ -403,12 +410,12 @@ TEST_P(EveryKernel, OneDescriptorMayBeIrregular) {
     for (const std::size_t at : {0U, 9U, 15U}) {
       Bytes with = descriptors;
       std::copy(bytes.begin(), bytes.end(), with.data() + at * kDescriptorSize);
-      ASSERT_EQ(nearest_two(*GetParam(), with, others), expected_neighbours(with, others));
+      ASSERT_EQ(nearest_two(GetParam(), with, others), expected_neighbours(with, others));
       Bytes among = others;
       std::copy(bytes.begin(), bytes.end(), among.data() + at * kDescriptorSize);
-      ASSERT_EQ(nearest_two(*GetParam(), descriptors, among),
+      ASSERT_EQ(nearest_two(GetParam(), descriptors, among),
                 expected_neighbours(descriptors, among));
-      ASSERT_EQ(nearest_two(*GetParam(), with, among), expected_neighbours(with, among));
+      ASSERT_EQ(nearest_two(GetParam(), with, among), expected_neighbours(with, among));
     }
   }
 }
@@ -422,7 +429,7 @@ TEST_P(EveryKernel, FirstOfEquallyNearOnesIsNearest) {
     others.insert(others.end(), descriptors.begin(), descriptors.end());
     others.insert(others.end(), between.begin(), between.end());
     others.insert(others.end(), descriptors.begin(), descriptors.end());
-    const Neighbours found = nearest_two(*GetParam(), descriptors, others);
+    const Neighbours found = nearest_two(GetParam(), descriptors, others);
     EXPECT_EQ(found, expected_neighbours(descriptors, others));
     for (std::size_t lane = 0; lane < kMatchLanes; ++lane) {
       EXPECT_EQ(found.index[lane], static_cast<int>(lane) + 3);
@@ -436,7 +443,7 @@ TEST_P(EveryKernel, MeasuresTheLargestDistances) {
   const Bytes highest(kMatchLanes * kDescriptorSize, 127);
   Bytes others(kDescriptorSize, -127);
   others.insert(others.end(), kDescriptorSize, 0);
-  const Neighbours found = nearest_two(*GetParam(), highest, others);
+  const Neighbours found = nearest_two(GetParam(), highest, others);
   EXPECT_EQ(found.index[0], 1);
   EXPECT_EQ(found.distance_sq[0], 64 * 127 * 127);
   EXPECT_EQ(found.second_distance_sq[0], 64 * 254 * 254);
@@ -448,7 +455,7 @@ TEST_P(EveryKernel, ComparesEachValueWithItsLike) {
     one[5 * kDescriptorSize + i] = -3;
     Bytes rising(kDescriptorSize);
     for (std::size_t k = 0; k < kDescriptorSize; ++k) rising[k] = static_cast<std::int8_t>(k + 1);
-    const Neighbours found = nearest_two(*GetParam(), one, rising);
+    const Neighbours found = nearest_two(GetParam(), one, rising);
     const int square = 64 * 65 * 129 / 6;
     ASSERT_EQ(found.distance_sq[4], square);
     ASSERT_EQ(found.distance_sq[5], square + 9 + 6 * static_cast<int>(i + 1));
@@ -457,7 +464,7 @@ TEST_P(EveryKernel, ComparesEachValueWithItsLike) {
 
 TEST_P(EveryKernel, WithoutOthersThereIsNoNeighbour) {
   Random random;
-  const Neighbours found = nearest_two(*GetParam(), random_bytes(random, kMatchLanes), {});
+  const Neighbours found = nearest_two(GetParam(), random_bytes(random, kMatchLanes), {});
   for (const std::int32_t distance : found.distance_sq) EXPECT_EQ(distance, NearestTwo::kNone);
   for (const std::int32_t second : found.second_distance_sq) EXPECT_EQ(second, NearestTwo::kNone);
 }
@@ -467,11 +474,11 @@ TEST_P(EveryKernel, ReadsDescriptorsAtAnyByte) {
   const Bytes descriptors = random_bytes(random, kMatchLanes + 1);
   const Bytes others = random_bytes(random, 7);
   for (std::size_t shift = 0; shift < kDescriptorSize; ++shift) {
-    const auto found = [&](const Kernels& kernels) {
-      return nearest_two(kernels, descriptors.data() + shift,
-                         others.data() + kDescriptorSize - shift, 6);
+    const auto found = [&](InstructionSet set) {
+      return nearest_two(set, descriptors.data() + shift, others.data() + kDescriptorSize - shift,
+                         6);
     };
-    EXPECT_EQ(found(*GetParam()), found(scalar())) << "from byte " << shift;
+    EXPECT_EQ(found(GetParam()), found(kScalar)) << "from byte " << shift;
   }
 }
 
@@ -481,30 +488,30 @@ TEST_P(EveryKernel, SumsTheMinimaOfEachPairOfCounts) {
     two[k] = 14;
     two[kBlockCounts + k] = 5;
     const Counts full(kBlockCounts, 16);
-    expect_reaching_queries(*GetParam(), full, {1}, two, {14, 6});
+    expect_reaching_queries(GetParam(), full, {1}, two, {14, 6});
   }
   for (std::size_t k = 0; k < kCoarseCounts * kInterleaved; ++k) {
     Counts one(kCoarseCounts * kInterleaved, 0);
     one[k] = 50;
-    expect_coarse_sums(*GetParam(), Counts(kCoarseCounts, 64), one);
+    expect_coarse_sums(GetParam(), Counts(kCoarseCounts, 64), one);
   }
 }
 
 TEST_P(EveryKernel, SumsTheLargestCounts) {
   const Counts full(4 * kBlockCounts, 16);
-  expect_reaching_queries(*GetParam(), full, {0b1111, 0b0101}, full, {4096, 4095, 4097, 0});
-  expect_reaching_queries(*GetParam(), full, {0, 0b1000}, full, {0, 1, 2, 3});
+  expect_reaching_queries(GetParam(), full, {0b1111, 0b0101}, full, {4096, 4095, 4097, 0});
+  expect_reaching_queries(GetParam(), full, {0, 0b1000}, full, {0, 1, 2, 3});
   const Counts full_groups(2 * kInterleaved * kCoarseCounts, 64);
-  expect_coarse_sums(*GetParam(), Counts(3 * kCoarseCounts, 64), full_groups);
-  expect_coarse_sums(*GetParam(), {}, full_groups);
-  expect_coarse_sums(*GetParam(), full, {});
+  expect_coarse_sums(GetParam(), Counts(3 * kCoarseCounts, 64), full_groups);
+  expect_coarse_sums(GetParam(), {}, full_groups);
+  expect_coarse_sums(GetParam(), full, {});
 }
 
 TEST_P(EveryKernel, TakesA15InARecordFor16) {
   const Counts query(kBlockCounts, 16);
   const Counts record(kBlockCounts, 15);
-  expect_reaching_queries(*GetParam(), query, {1}, record, {4096});
-  expect_reaching_queries(*GetParam(), Counts(kBlockCounts, 15), {1}, record, {15 * 256});
+  expect_reaching_queries(GetParam(), query, {1}, record, {4096});
+  expect_reaching_queries(GetParam(), Counts(kBlockCounts, 15), {1}, record, {15 * 256});
 }
 
 TEST_P(EveryKernel, SumsCoarseCountsWhereQueriesHaveAny) {
@@ -516,7 +523,7 @@ TEST_P(EveryKernel, SumsCoarseCountsWhereQueriesHaveAny) {
     for (std::size_t k = kCoarseCounts - filled; k < kCoarseCounts; ++k) {
       queries[kCoarseCounts + k] = 40;
     }
-    expect_coarse_sums(*GetParam(), queries, records);
+    expect_coarse_sums(GetParam(), queries, records);
   }
 }
 
@@ -537,7 +544,7 @@ TEST_P(EveryKernel, FindsTheQueriesThatReachWhatARecordNeeds) {
           least[i] = static_cast<std::uint16_t>(
               sum_of_minima(queries, i % 9, records, i, kBlockCounts) + random.between(0, 1));
         }
-        expect_reaching_queries(*GetParam(), queries, among, records, least);
+        expect_reaching_queries(GetParam(), queries, among, records, least);
       }
     }
   }
@@ -549,7 +556,7 @@ TEST_P(EveryKernel, SumsTheMinimaOfCoarseCounts) {
     for (const std::size_t num_queries : {1U, 2U, 3U, 4U, 5U, 6U, 9U, 16U}) {
       for (const std::size_t num_groups : {1U, 2U, 5U}) {
         expect_coarse_sums(
-            *GetParam(), random_counts(random, num_queries * kCoarseCounts, largest),
+            GetParam(), random_counts(random, num_queries * kCoarseCounts, largest),
             random_counts(random, num_groups * kInterleaved * kCoarseCounts, largest));
       }
     }
@@ -568,7 +575,7 @@ TEST_P(EveryKernel, SelectsRecordsWithinLimitsThatQueriesReach) {
          {std::pair{0, 32'767}, {1, 4097}, {1, 1}, {2000, 3000}, {4000, 4096}, {4096, 4097}}) {
       for (const int floor : {0, 1, 30'000, 50'000, 65'535}) {
         for (const int query_count : {1, 2500, 4096}) {
-          expect_selected(*GetParam(), records,
+          expect_selected(GetParam(), records,
                           {.lower = static_cast<std::uint16_t>(lower),
                            .upper = static_cast<std::uint16_t>(upper),
                            .query_count = static_cast<std::uint16_t>(query_count),
@@ -577,7 +584,8 @@ TEST_P(EveryKernel, SelectsRecordsWithinLimitsThatQueriesReach) {
       }
     }
   }
-  EXPECT_EQ(GetParam()->select_records(nullptr, nullptr, 5, 0, {.lower = 1, .upper = 2}, nullptr),
+  EXPECT_EQ(kernels_for<BoundKernels>(GetParam())
+                .select_records(nullptr, nullptr, 5, 0, {.lower = 1, .upper = 2}, nullptr),
             0U);
 }
 
@@ -593,7 +601,7 @@ TEST_P(EveryKernel, SelectsRecordsWhoseSumIsJustWhatIsNeeded) {
     records.sums[0] = static_cast<std::uint16_t>(2048 - less);
     records.sums[1] = static_cast<std::uint16_t>(2047 - less);
     records.sums[2] = static_cast<std::uint16_t>(50 - less);
-    expect_selected(*GetParam(), records,
+    expect_selected(GetParam(), records,
                     {.lower = 1, .upper = 4097, .query_count = 100, .floor = 32'768});
   }
 }
@@ -603,7 +611,7 @@ TEST_P(EveryKernel, SolvesSamplesOfSevenPairs) {
   for (int run = 0; run < 20; ++run) {
     const PairSamples samples = random_samples(random);
     EpipolarPencils pencils;
-    GetParam()->solve_samples(samples, pencils);
+    kernels_for<EpipolarKernels>(GetParam()).solve_samples(samples, pencils);
     for (std::size_t lane = 0; lane < kSampleLanes; ++lane) {
       ASSERT_EQ(pencils.is_determined[lane], 1);
       for (const double x : {-1.5, 0.0, 0.3, 2.0}) {
@@ -630,8 +638,8 @@ TEST_P(EveryKernel, PencilsEqualTheScalarOnes) {
     const PairSamples samples = random_samples(random);
     EpipolarPencils pencils;
     EpipolarPencils expected;
-    GetParam()->solve_samples(samples, pencils);
-    scalar().solve_samples(samples, expected);
+    kernels_for<EpipolarKernels>(GetParam()).solve_samples(samples, pencils);
+    kernels_for<EpipolarKernels>(kScalar).solve_samples(samples, expected);
     for (std::size_t lane = 0; lane < kSampleLanes; ++lane) {
       for (std::size_t i = 0; i < 9; ++i) {
         ASSERT_EQ(pencils.f[i][lane], expected.f[i][lane]);
@@ -654,7 +662,7 @@ TEST_P(EveryKernel, TellsWhichSamplesDetermineNothing) {
     }
   }
   EpipolarPencils pencils;
-  GetParam()->solve_samples(samples, pencils);
+  kernels_for<EpipolarKernels>(GetParam()).solve_samples(samples, pencils);
   for (std::size_t lane = 0; lane < kSampleLanes; ++lane) {
     EXPECT_EQ(pencils.is_determined[lane], lane == 2 || lane == 5 ? 0 : 1) << lane;
   }
@@ -670,7 +678,8 @@ TEST_P(EveryKernel, ScoresPairsBySampsonsDistance) {
     std::generate(model.begin(), model.end(), [&] { return random_coordinate(random); });
     std::vector<std::uint8_t> is_inlier(count + kPairBlock, 9);
     const EpipolarScore score =
-        GetParam()->epipolar_score(model.data(), pairs, kMaxErrorSq, is_inlier.data());
+        kernels_for<EpipolarKernels>(GetParam())
+            .epipolar_score(model.data(), pairs, kMaxErrorSq, is_inlier.data());
     double cost = 0;
     int inliers = 0;
     for (std::size_t i = 0; i < count; ++i) {
@@ -683,8 +692,8 @@ TEST_P(EveryKernel, ScoresPairsBySampsonsDistance) {
     EXPECT_NEAR(score.cost, cost, 1e-4) << count;
 
     std::vector<std::uint8_t> expected_inliers(is_inlier.size(), 9);
-    const EpipolarScore expected =
-        scalar().epipolar_score(model.data(), pairs, kMaxErrorSq, expected_inliers.data());
+    const EpipolarScore expected = kernels_for<EpipolarKernels>(kScalar).epipolar_score(
+        model.data(), pairs, kMaxErrorSq, expected_inliers.data());
     EXPECT_EQ(score.cost, expected.cost);
     EXPECT_EQ(is_inlier, expected_inliers);
   }
@@ -696,20 +705,23 @@ TEST_P(EveryKernel, WithoutGradientThereIsNoInlier) {
   const std::array<float, 9> nothing{};
   std::vector<std::uint8_t> is_inlier(kPairBlock, 9);
   const EpipolarScore score =
-      GetParam()->epipolar_score(nothing.data(), random_pairs.pairs, 0.5F, is_inlier.data());
+      kernels_for<EpipolarKernels>(GetParam())
+          .epipolar_score(nothing.data(), random_pairs.pairs, 0.5F, is_inlier.data());
   EXPECT_EQ(score.inliers, 0);
   EXPECT_EQ(score.cost, 1.5F);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kernels, EveryKernel,
-                         testing::ValuesIn(available_kernels().begin(), available_kernels().end()),
-                         [](const auto& kernels) { return std::string(kernels.param->name); });
+INSTANTIATE_TEST_SUITE_P(Kernels, EveryKernel, testing::ValuesIn(available_instruction_sets()),
+                         [](const auto& set) { return std::string(to_string(set.param)); });
 
-TEST(Kernels, ScalarIsAlwaysThereAndFirst) { EXPECT_EQ(scalar().name, "scalar"); }
+TEST(Kernels, ScalarIsAlwaysThereAndFirst) {
+  EXPECT_EQ(available_instruction_sets().front(), kScalar);
+}
 
 TEST(Kernels, ActiveIsTheFastestUnlessAnotherIsForced) {
   const char* forced = std::getenv("LOOPBIT_KERNEL");
-  EXPECT_EQ(active_kernels().name, forced == nullptr ? available_kernels().back()->name : forced);
+  EXPECT_EQ(to_string(active_instruction_set()),
+            forced == nullptr ? to_string(available_instruction_sets().back()) : forced);
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "loopbit/binary_content.hpp"
+#include "loopbit/kernels_for.hpp"
 
 #include "full_scan.hpp"
 #include "test_support.hpp"
@@ -37,7 +38,7 @@ std::vector<RetrievalOptions> some_options() {
   };
 }
 
-class PrunedSearchTest : public testing::TestWithParam<const Kernels*> {
+class PrunedSearchTest : public testing::TestWithParam<InstructionSet> {
  protected:
   static void expect_as_full_scan(const Contents& places, const Contents& queries) {
     PlaceStore store;
@@ -46,7 +47,7 @@ class PrunedSearchTest : public testing::TestWithParam<const Kernels*> {
     for (const BinaryContent& query : queries) {
       PlaceId end = size;
       for (const RetrievalOptions& options : some_options()) {
-        PrunedSearch search(store, end, query, options, *GetParam());
+        PrunedSearch search(store, end, query, options, GetParam());
         ASSERT_EQ(search.run(), full_scan(places, query, end, options))
             << "shift " << options.shift_tolerance_columns << ", spacing " << options.min_spacing
             << ", most " << options.max_candidates << ", end " << end << " of " << size;
@@ -126,14 +127,13 @@ TEST_P(PrunedSearchTest, AcrossChunksOfMemory) {
   PlaceStore store;
   add_all(store, places);
   for (const std::size_t query : {65'530U, 66'100U}) {
-    PrunedSearch search(store, store.size(), places[query], {}, *GetParam());
+    PrunedSearch search(store, store.size(), places[query], {}, GetParam());
     ASSERT_EQ(search.run(), full_scan(places, places[query], store.size(), {}));
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Kernels, PrunedSearchTest,
-                         testing::ValuesIn(available_kernels().begin(), available_kernels().end()),
-                         [](const auto& kernels) { return std::string(kernels.param->name); });
+INSTANTIATE_TEST_SUITE_P(Kernels, PrunedSearchTest, testing::ValuesIn(available_instruction_sets()),
+                         [](const auto& set) { return std::string(to_string(set.param)); });
 
 TEST(FoundPlaces, LeaveRoomForAPlaceThatKeepsSeveralOut) {
   FoundPlaces found({.max_candidates = 2, .min_similarity = 0.0, .min_spacing = 3});
@@ -177,7 +177,8 @@ TEST(PrunedSearch, OfEqualPlacesLooksAtFew) {
   const BinaryContent content = random_content(random, 0.3);
   PlaceStore store;
   add_all(store, Contents(5'000, content));
-  PrunedSearch search(store, store.size(), content, {.max_candidates = 20}, active_kernels());
+  PrunedSearch search(store, store.size(), content, {.max_candidates = 20},
+                      active_instruction_set());
   EXPECT_EQ(search.run().size(), 20U);
   EXPECT_LT(search.work().contents, 500);
 }
@@ -246,7 +247,8 @@ int packed_sum(const BlockCounts& query, const BlockCounts& counts) {
   const std::uint16_t among = 1;
   const std::uint16_t least = 0;
   Reached reached{};
-  active_kernels().reaching_queries(query.of.data(), &among, &address, 1, &least, &reached);
+  kernels_for<BoundKernels>(active_instruction_set())
+      .reaching_queries(query.of.data(), &among, &address, 1, &least, &reached);
   return reached.largest_sum;
 }
 

@@ -12,15 +12,21 @@
 #include <dlib/opencv.h>
 #include <gtest/gtest.h>
 
+#include "loopbit/kernels_for.hpp"
+
 #include "hessian_pyramid.hpp"
 #include "integral_image.hpp"
 #include "patch.hpp"
+#include "surf_kernels.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
 namespace {
 
-class EveryKernel : public testing::TestWithParam<const Kernels*> {};
+class EveryKernel : public testing::TestWithParam<InstructionSet> {
+ protected:
+  [[nodiscard]] static const SurfKernels& kernels() { return kernels_for<SurfKernels>(GetParam()); }
+};
 
 TEST_P(EveryKernel, LinearRowsLieBetweenFourPixels) {
   Random random(3);
@@ -40,7 +46,7 @@ TEST_P(EveryKernel, LinearRowsLieBetweenFourPixels) {
       std::vector<std::uint16_t> blended(static_cast<std::size_t>(width) + 1);
       std::vector<std::uint32_t> pairs(blended.size());
       std::array<std::uint8_t, kCount> pixels{};
-      GetParam()->linear_row(from, kCount, blended.data(), pairs.data(), pixels.data());
+      kernels().linear_row(from, kCount, blended.data(), pairs.data(), pixels.data());
       for (std::size_t i = 0; i < kCount; ++i) {
         const int next = std::min(columns.at(i) + 1, width - 1);
         const double down = lower_weight / 256.0;
@@ -58,7 +64,7 @@ TEST_P(EveryKernel, IntegralImageSumsBoxes) {
                               cv::Size(33, 40), cv::Size(201, 65)}) {
     const cv::Mat1b gray = textured_image(size, 3);
     IntegralImage integral;
-    integral.load(gray, *GetParam());
+    integral.load(gray, kernels());
     for (int y = 0; y <= size.height; ++y) {
       for (int x = 0; x <= size.width; ++x) {
         const int expected = static_cast<int>(cv::sum(gray(cv::Rect(0, 0, x, y)))[0]);
@@ -71,7 +77,7 @@ TEST_P(EveryKernel, IntegralImageSumsBoxes) {
 TEST(IntegralImage, SumsPartsOfPixels) {
   const cv::Mat1b gray = (cv::Mat1b(2, 3) << 1, 2, 4, 8, 16, 32);
   IntegralImage integral;
-  integral.load(gray, active_kernels());
+  integral.load(gray, kernels_for<SurfKernels>(active_instruction_set()));
   EXPECT_DOUBLE_EQ(integral.sum_before(3, 2), 63);
   EXPECT_DOUBLE_EQ(integral.sum_before(0.5, 0.25), 0.5 * 0.25 * 1);
   EXPECT_DOUBLE_EQ(integral.sum_before(1.75, 1.5), 1 + 0.75 * 2 + 0.5 * (8 + 0.75 * 16));
@@ -107,9 +113,9 @@ TEST_P(EveryKernel, ResponsesEqualDlibs) {
     dlib::hessian_pyramid peer;
     peer.build_pyramid(peer_integral, HessianPyramid::kOctaves, HessianPyramid::kIntervals, 2);
     IntegralImage integral;
-    integral.load(gray, *GetParam());
+    integral.load(gray, kernels());
     HessianPyramid pyramid;
-    pyramid.build(integral, *GetParam());
+    pyramid.build(integral, kernels());
     for (int i = 0; i < HessianPyramid::kOctaves * HessianPyramid::kIntervals; ++i) {
       SCOPED_TRACE(size);
       expect_layer_equals(pyramid, peer, i / HessianPyramid::kIntervals,
@@ -133,9 +139,9 @@ bool is_maximum(const HessianPyramid& pyramid, int octave, int interval, int x, 
 TEST_P(EveryKernel, MaximaAreLargerThanTheirNeighbours) {
   const cv::Mat1b gray = textured_image({403, 301}, 5);
   IntegralImage integral;
-  integral.load(gray, *GetParam());
+  integral.load(gray, kernels());
   HessianPyramid pyramid;
-  pyramid.build(integral, *GetParam());
+  pyramid.build(integral, kernels());
   std::vector<cv::Vec4i> expected;
   for (int o = 0; o < HessianPyramid::kOctaves; ++o) {
     for (const int i : {1, 2}) {
@@ -150,7 +156,7 @@ TEST_P(EveryKernel, MaximaAreLargerThanTheirNeighbours) {
     }
   }
   std::vector<Maximum> maxima;
-  pyramid.find_maxima(1.0F, *GetParam(), maxima);
+  pyramid.find_maxima(1.0F, kernels(), maxima);
   ASSERT_EQ(maxima.size(), expected.size());
   EXPECT_GT(expected.size(), 100U);
   for (std::size_t i = 0; i < maxima.size(); ++i) {
@@ -163,10 +169,10 @@ TEST_P(EveryKernel, MaximaAreLargerThanTheirNeighbours) {
 TEST_P(EveryKernel, CellsAreMeans) {
   const cv::Mat1b gray = textured_image({300, 200}, 6);
   IntegralImage integral;
-  integral.load(gray, *GetParam());
+  integral.load(gray, kernels());
   Patch patch{};
   // With an even scale and a centre on a pixel, all cells have the same size.
-  upright_patch(integral, {.x_px = 150, .y_px = 100, .scale = 4}, *GetParam(), patch);
+  upright_patch(integral, {.x_px = 150, .y_px = 100, .scale = 4}, kernels(), patch);
   for (int i = 0; i < static_cast<int>(kCells); ++i) {
     for (int k = 0; k < static_cast<int>(kCells); ++k) {
       const cv::Rect cell(150 - 42 + 1 + 4 * k, 100 - 42 + 1 + 4 * i, 4, 4);
@@ -185,7 +191,7 @@ TEST_P(EveryKernel, DescribesAFlatPatchByZeros) {
   }();
   Descriptor descriptor{};
   descriptor.fill(5);
-  GetParam()->describe(flat.data(), descriptor.data());
+  kernels().describe(flat.data(), descriptor.data());
   EXPECT_EQ(descriptor, Descriptor{});
 }
 
@@ -227,12 +233,12 @@ Values slow_descriptor(const Patch& cells) {
 TEST_P(EveryKernel, DescribesAsTheSlowWay) {
   const cv::Mat1b gray = textured_image({300, 200}, 7);
   IntegralImage integral;
-  integral.load(gray, *GetParam());
+  integral.load(gray, kernels());
   for (const float scale : {2.0F, 3.3F, 7.0F}) {
     Patch patch{};
-    upright_patch(integral, {.x_px = 150, .y_px = 100, .scale = scale}, *GetParam(), patch);
+    upright_patch(integral, {.x_px = 150, .y_px = 100, .scale = scale}, kernels(), patch);
     Descriptor descriptor{};
-    GetParam()->describe(patch.data(), descriptor.data());
+    kernels().describe(patch.data(), descriptor.data());
     const Values expected = slow_descriptor(patch);
     for (std::size_t i = 0; i < kDescriptorSize; ++i) {
       EXPECT_NEAR(descriptor.at(i), std::clamp(expected.at(i), -127.0, 127.0), 0.51) << i;
@@ -240,9 +246,8 @@ TEST_P(EveryKernel, DescribesAsTheSlowWay) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Surf, EveryKernel,
-                         testing::ValuesIn(available_kernels().begin(), available_kernels().end()),
-                         [](const auto& kernels) { return std::string(kernels.param->name); });
+INSTANTIATE_TEST_SUITE_P(Surf, EveryKernel, testing::ValuesIn(available_instruction_sets()),
+                         [](const auto& set) { return std::string(to_string(set.param)); });
 
 }  // namespace
 }  // namespace loopbit::test

@@ -87,9 +87,9 @@ void expect_same(const Features& a, const Features& b) {
   }
 }
 
-Features extract_with(const Kernels& kernels, const cv::Mat1b& gray, const SurfOptions& options) {
+Features extract_with(InstructionSet set, const cv::Mat1b& gray, const SurfOptions& options) {
   Features features;
-  SurfExtractor(options, kernels).extract(gray, features);
+  SurfExtractor(options, set).extract(gray, features);
   return features;
 }
 
@@ -99,10 +99,10 @@ TEST(Surf, EveryKernelFindsTheSameFeatures) {
     const cv::Mat1b gray = textured_image(size, size.width);
     for (const bool upright : {true, false}) {
       const SurfOptions options{.working_area_px = size.area(), .upright = upright};
-      const Features expected = extract_with(*available_kernels().front(), gray, options);
-      for (const Kernels* kernels : available_kernels()) {
-        SCOPED_TRACE(std::string(kernels->name));
-        expect_same(extract_with(*kernels, gray, options), expected);
+      const Features expected = extract_with(InstructionSet::scalar, gray, options);
+      for (const InstructionSet set : available_instruction_sets()) {
+        SCOPED_TRACE(std::string(to_string(set)));
+        expect_same(extract_with(set, gray, options), expected);
       }
     }
   }
@@ -113,11 +113,11 @@ TEST(Surf, EveryKernelFindsTheSameFeaturesInRealImages) {
     LOOPBIT_NEEDS_DATA(folder);
     for (const std::size_t index : {0U, 33U, 66U}) {
       const cv::Mat1b gray = real_image(folder + "/images", index);
-      const Features expected = extract_with(*available_kernels().front(), gray, {});
+      const Features expected = extract_with(InstructionSet::scalar, gray, {});
       EXPECT_GT(expected.keypoints.size(), 100U);
-      for (const Kernels* kernels : available_kernels()) {
-        SCOPED_TRACE(std::string(kernels->name));
-        expect_same(extract_with(*kernels, gray, {}), expected);
+      for (const InstructionSet set : available_instruction_sets()) {
+        SCOPED_TRACE(std::string(to_string(set)));
+        expect_same(extract_with(set, gray, {}), expected);
       }
     }
   }

@@ -10,7 +10,6 @@
 #include "loopbit/binary_content.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/gray_image.hpp"
-#include "loopbit/kernels.hpp"
 
 #include "bindings.hpp"
 #include "numpy_image.hpp"
@@ -67,8 +66,7 @@ void fill_matrix(const Contents& queries, const Contents& places, int shift_tole
   std::vector<std::uint16_t> overlaps(places.size());
   for (const BinaryContent& query : queries) {
     const Contents shifted = tolerated_shifts(query, shift_tolerance_columns);
-    active_kernels().max_overlaps(shifted.front().rows.data(), shifted.size(),
-                                  places.front().rows.data(), places.size(), overlaps.data());
+    max_overlaps(shifted, places, overlaps);
     const int query_count = count(query);
     for (std::size_t j = 0; j < places.size(); ++j) {
       // Nothing overlaps an empty content, so dividing by 1 gives its 0.

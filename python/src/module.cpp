@@ -3,7 +3,7 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <pybind11/pybind11.h>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/version.hpp"
 
 #include "bindings.hpp"
@@ -19,8 +19,8 @@ PYBIND11_MODULE(_loopbit, module) {
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   python::bind_errors(module);
   module.def(
-      "active_kernel", [] { return std::string(loopbit::active_kernels().name); },
-      "The instruction set of the kernels: scalar, avx2, avx512 or, on Arm, dotprod. "
+      "active_kernel", [] { return to_string(loopbit::active_instruction_set()); },
+      "The instruction set of the inner loops: scalar, avx2, avx512 or, on Arm, dotprod. "
       "LOOPBIT_KERNEL forces one.");
   python::bind_options(module);
   python::bind_content(module);

@@ -3,6 +3,7 @@
 #include "loopbit/binary_content.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -12,6 +13,9 @@
 
 #include "loopbit/gray_image.hpp"
 #include "loopbit/image_shrinker.hpp"
+#include "loopbit/kernels_for.hpp"
+
+#include "overlap_kernels.hpp"
 
 namespace loopbit {
 namespace {
@@ -156,6 +160,17 @@ double similarity(const BinaryContent& a, const BinaryContent& b, int shift_tole
     best = std::max(best, overlap(shifted, b));
   }
   return static_cast<double>(best) / larger;
+}
+
+void max_overlaps(std::span<const BinaryContent> queries, std::span<const BinaryContent> places,
+                  std::span<std::uint16_t> overlaps, InstructionSet instruction_set) {
+  static_assert(sizeof(BinaryContent) == kContentWords * sizeof(std::uint64_t));
+  assert(overlaps.size() >= places.size());
+  const auto words = [](std::span<const BinaryContent> contents) {
+    return reinterpret_cast<const std::uint64_t*>(contents.data());
+  };
+  kernels_for<OverlapKernels>(instruction_set)
+      .max_overlaps(words(queries), queries.size(), words(places), places.size(), overlaps.data());
 }
 
 cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options) {

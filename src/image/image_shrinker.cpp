@@ -5,6 +5,10 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "loopbit/kernels_for.hpp"
+
+#include "shrink_kernels.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -23,7 +27,7 @@ class Axis {
   }
 
  private:
-  static constexpr int kMaxPixelLength = 256;  // a weight that Kernels::add_pixels takes
+  static constexpr int kMaxPixelLength = 256;  // a weight that ShrinkKernels::add_pixels takes
 
   std::int64_t pixels_;
   std::int64_t parts_;
@@ -33,6 +37,7 @@ class Axis {
 }  // namespace
 
 void ImageShrinker::shrink(const cv::Mat1b& gray, cv::Size size, cv::Mat1b& small) {
+  const auto& kernels = kernels_for<ShrinkKernels>(instruction_set_);
   small.create(size);
   sums_.resize(static_cast<std::size_t>(gray.cols) + 1);
   up_to_.resize(sums_.size());
@@ -45,8 +50,8 @@ void ImageShrinker::shrink(const cv::Mat1b& gray, cv::Size size, cv::Mat1b& smal
     for (std::int64_t row = top / down.pixel_length(); row * down.pixel_length() < bottom; ++row) {
       const std::int64_t share = std::min(bottom, (row + 1) * down.pixel_length()) -
                                  std::max(top, row * down.pixel_length());
-      kernels_.add_pixels(gray[static_cast<int>(row)], sums_.size() - 1,
-                          static_cast<std::uint16_t>(share), sums_.data());
+      kernels.add_pixels(gray[static_cast<int>(row)], sums_.size() - 1,
+                         static_cast<std::uint16_t>(share), sums_.data());
     }
     average(static_cast<double>(bottom - top), small[y]);
   }

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -16,7 +17,6 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/gray_image.hpp"
-#include "loopbit/kernels.hpp"
 
 #include "agreement.hpp"
 #include "candidate_verifier.hpp"
@@ -59,11 +59,11 @@ int moved_inliers(const Features& query, const Features& place, const std::vecto
   }));
 }
 
-/// similarity(a, b) by the kernels: a map may have a million places to compare.
+/// similarity(a, b) by max_overlaps(): a map may have a million places to compare.
 double quick_similarity(const BinaryContent& a, const BinaryContent& b) {
   const auto overlap = [](const BinaryContent& x, const BinaryContent& y) {
     std::uint16_t pixels = 0;
-    active_kernels().max_overlaps(x.rows.data(), 1, y.rows.data(), 1, &pixels);
+    max_overlaps(std::span(&x, 1), std::span(&y, 1), std::span(&pixels, 1));
     return pixels;
   };
   const int larger = std::max(overlap(a, a), overlap(b, b));

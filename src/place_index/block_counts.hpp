@@ -7,7 +7,8 @@
 #include <cstdint>
 
 #include "loopbit/binary_content.hpp"
-#include "loopbit/kernels.hpp"
+
+#include "bound_kernels.hpp"
 
 namespace loopbit {
 

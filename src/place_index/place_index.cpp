@@ -7,8 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "loopbit/kernels.hpp"
-
 #include "place_store.hpp"
 #include "pruned_search.hpp"
 
@@ -43,7 +41,7 @@ std::vector<Candidate> PlaceIndex::query(const BinaryContent& content, PlaceId e
   end = std::min(end, size());
   if (work != nullptr) *work = {};
   if (end <= 0 || count(content) == 0) return {};
-  PrunedSearch search(*store_, end, content, options, active_kernels());
+  PrunedSearch search(*store_, end, content, options, active_instruction_set());
   std::vector<Candidate> candidates = search.run();
   if (work != nullptr) *work = search.work();
   return candidates;

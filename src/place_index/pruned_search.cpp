@@ -8,6 +8,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "loopbit/kernels_for.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -50,9 +52,10 @@ void prefetch(const void* begin, std::size_t size_bytes) {
 }  // namespace
 
 PrunedSearch::PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryContent& query,
-                           const RetrievalOptions& options, const Kernels& kernels)
+                           const RetrievalOptions& options, InstructionSet instruction_set)
     : store_(store),
-      kernels_(kernels),
+      instruction_set_(instruction_set),
+      kernels_(kernels_for<BoundKernels>(instruction_set)),
       options_(options),
       end_(static_cast<std::size_t>(end)),
       num_groups_(end_ / kGroupPlaces),
@@ -247,9 +250,9 @@ void PrunedSearch::compare_stretch(const Stretch& stretch) {
   for (unsigned left = stretch.shifts; left != 0; left &= left - 1) {
     const std::size_t shift = static_cast<std::size_t>(std::countr_zero(left)) * shifts_per_group_;
     std::array<std::uint16_t, kFinestPlaces> overlaps{};
-    kernels_.max_overlaps(shifted_[shift].rows.data(),
-                          std::min(shifts_per_group_, shifted_.size() - shift),
-                          store_.content(first).rows.data(), kFinestPlaces, overlaps.data());
+    const std::size_t shifts = std::min(shifts_per_group_, shifted_.size() - shift);
+    max_overlaps(std::span(shifted_).subspan(shift, shifts),
+                 std::span(&store_.content(first), kFinestPlaces), overlaps, instruction_set_);
     for (std::size_t i = 0; i < kFinestPlaces; ++i) best[i] = std::max(best[i], overlaps[i]);
   }
   work_.contents += std::int64_t{kFinestPlaces};
@@ -258,8 +261,8 @@ void PrunedSearch::compare_stretch(const Stretch& stretch) {
 
 void PrunedSearch::compare_place(std::size_t place) {
   std::uint16_t overlap = 0;
-  kernels_.max_overlaps(shifted_.front().rows.data(), shifted_.size(),
-                        store_.content(place).rows.data(), 1, &overlap);
+  max_overlaps(shifted_, std::span(&store_.content(place), 1), std::span(&overlap, 1),
+               instruction_set_);
   ++work_.contents;
   consider(place, overlap);
 }

@@ -10,10 +10,10 @@
 #include <span>
 #include <vector>
 
-#include "loopbit/kernels.hpp"
 #include "loopbit/place_index.hpp"
 
 #include "block_counts.hpp"
+#include "bound_kernels.hpp"
 #include "found_places.hpp"
 #include "place_store.hpp"
 #include "stretch_queue.hpp"
@@ -31,7 +31,7 @@ class PrunedSearch {
  public:
   /// Searches the first `end` places, at most store.size(). `query` is not empty.
   PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryContent& query,
-               const RetrievalOptions& options, const Kernels& kernels);
+               const RetrievalOptions& options, InstructionSet instruction_set);
 
   [[nodiscard]] std::vector<Candidate> run();
 
@@ -77,7 +77,8 @@ class PrunedSearch {
   [[nodiscard]] bool is_within_limits(std::size_t place) const;
 
   const PlaceStore& store_;
-  const Kernels& kernels_;
+  InstructionSet instruction_set_;
+  const BoundKernels& kernels_;
   RetrievalOptions options_;
   std::size_t end_;
   std::size_t num_groups_;  ///< of coarsest stretches, all of them whole
@@ -88,7 +89,7 @@ class PrunedSearch {
   std::uint16_t all_shifts_ = 0;                   ///< a bit for each group of shifts
   std::vector<BlockCounts> group_counts_;          ///< for each group of shifts, the maxima
   std::vector<CoarseCounts> coarse_counts_;        ///< likewise
-  std::unique_ptr<std::uint16_t[]> coarse_sums_;   ///< see Kernels::coarse_sums
+  std::unique_ptr<std::uint16_t[]> coarse_sums_;   ///< see BoundKernels::coarse_sums
   std::unique_ptr<std::uint16_t[]> largest_sums_;  ///< for each group of stretches
   FoundPlaces found_;
   StretchQueue waiting_;

@@ -5,8 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-
-#include "loopbit/kernels.hpp"
+#include <span>
 
 namespace loopbit::report {
 namespace {
@@ -46,8 +45,7 @@ void compare_evenly(SimilarityMatrix& matrix, const std::vector<BinaryContent>& 
   for (std::size_t later = 1; later < compared.size(); ++later) {
     const std::vector<BinaryContent> shifted =
         tolerated_shifts(compared[later], shift_tolerance_columns);
-    active_kernels().max_overlaps(shifted.front().rows.data(), shifted.size(),
-                                  compared.front().rows.data(), later, overlaps.data());
+    max_overlaps(shifted, std::span(compared).first(later), overlaps);
     for (std::size_t earlier = 0; earlier < later; ++earlier) {
       const double larger = std::max({counts[later], counts[earlier], 1});
       raise(matrix, static_cast<int>(later) * step, static_cast<int>(earlier) * step,

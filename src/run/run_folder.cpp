@@ -17,7 +17,7 @@
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
-#include "loopbit/kernels.hpp"
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/version.hpp"
 #include "loopbit/write_file.hpp"
 
@@ -59,7 +59,7 @@ Json machine() {
   uname(&system);
   return {{"processor", processor_name()},
           {"cores", std::thread::hardware_concurrency()},
-          {"kernel", active_kernels().name},
+          {"kernel", to_string(active_instruction_set())},
           {"system", fmt::format("{} {} {}", system.sysname, system.release, system.machine)}};
 }
 

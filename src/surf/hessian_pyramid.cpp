@@ -45,7 +45,7 @@ cv::Rect HessianPyramid::valid_samples(int octave, int interval) const {
   return {first, first, std::max(0, end_x - first), std::max(0, end_y - first)};
 }
 
-void HessianPyramid::build(const IntegralImage& integral, const Kernels& kernels) {
+void HessianPyramid::build(const IntegralImage& integral, const SurfKernels& kernels) {
   integral_ = &integral;
   const cv::Size size = integral.size_px();
   for (int o = 0; o < kOctaves; ++o) {
@@ -66,7 +66,7 @@ void HessianPyramid::build(const IntegralImage& integral, const Kernels& kernels
 }
 
 void HessianPyramid::compute(const cv::Rect& tile, int octave, int first_interval,
-                             const Kernels& kernels) {
+                             const SurfKernels& kernels) {
   const std::ptrdiff_t step = step_px(octave);
   const std::ptrdiff_t part = step / kRowStep_px;
   Octave& of = octaves_[static_cast<std::size_t>(octave)];
@@ -130,7 +130,7 @@ void HessianPyramid::append_marked(int octave, int interval, int y,
   }
 }
 
-void HessianPyramid::find_maxima(float min_response, const Kernels& kernels,
+void HessianPyramid::find_maxima(float min_response, const SurfKernels& kernels,
                                  std::vector<Maximum>& maxima) {
   for (int o = 0; o < kOctaves; ++o) {
     const Octave& octave = octaves_[static_cast<std::size_t>(o)];

@@ -44,11 +44,11 @@ class HessianPyramid {
   }
 
   /// `integral` must outlive what is asked of the pyramid.
-  void build(const IntegralImage& integral, const Kernels& kernels);
+  void build(const IntegralImage& integral, const SurfKernels& kernels);
 
   /// Appends the maxima whose response is above `min_response`, of the two middle intervals.
   /// Of equal neighbours, the first is one.
-  void find_maxima(float min_response, const Kernels& kernels, std::vector<Maximum>& maxima);
+  void find_maxima(float min_response, const SurfKernels& kernels, std::vector<Maximum>& maxima);
 
   /// By a quadric through the 27 samples (Brown and Lowe, BMVC 2002); nothing if its peak is not
   /// nearest to the sample.
@@ -77,7 +77,7 @@ class HessianPyramid {
     }
   };
 
-  void compute(const cv::Rect& tile, int octave, int first_interval, const Kernels& kernels);
+  void compute(const cv::Rect& tile, int octave, int first_interval, const SurfKernels& kernels);
   void take_from_below(int octave, int interval);
   void append_marked(int octave, int interval, int y, std::vector<Maximum>& maxima) const;
   [[nodiscard]] bool equals_earlier_neighbour(int octave, int interval, int x, int y) const;

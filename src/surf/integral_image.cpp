@@ -14,7 +14,7 @@ constexpr std::ptrdiff_t kLine = 16;
 
 }  // namespace
 
-void IntegralImage::load(const cv::Mat1b& gray, const Kernels& kernels) {
+void IntegralImage::load(const cv::Mat1b& gray, const SurfKernels& kernels) {
   size_px_ = gray.size();
   const std::ptrdiff_t half = (gray.cols / 2 + kLine) / kLine * kLine;
   stride_ = 2 * half;

@@ -8,7 +8,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "loopbit/kernels.hpp"
+#include "surf_kernels.hpp"
 
 namespace loopbit {
 
@@ -17,7 +17,7 @@ namespace loopbit {
 /// to image.
 class IntegralImage {
  public:
-  void load(const cv::Mat1b& gray, const Kernels& kernels);
+  void load(const cv::Mat1b& gray, const SurfKernels& kernels);
 
   [[nodiscard]] cv::Size size_px() const { return size_px_; }
   [[nodiscard]] IntegralView view() const {

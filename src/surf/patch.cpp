@@ -8,8 +8,8 @@
 
 namespace loopbit {
 
-void upright_patch(const IntegralImage& integral, const Keypoint& keypoint, const Kernels& kernels,
-                   Patch& patch) {
+void upright_patch(const IntegralImage& integral, const Keypoint& keypoint,
+                   const SurfKernels& kernels, Patch& patch) {
   kernels.upright_cells(integral.view(), keypoint.x_px, keypoint.y_px, keypoint.scale,
                         patch.data());
 }

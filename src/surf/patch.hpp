@@ -4,10 +4,10 @@
 
 #include <array>
 
-#include "loopbit/kernels.hpp"
 #include "loopbit/surf.hpp"
 
 #include "integral_image.hpp"
+#include "surf_kernels.hpp"
 
 namespace loopbit {
 
@@ -19,8 +19,8 @@ using Patch = std::array<float, kCellsInMemory>;
 
 /// The cells around an upright keypoint; their edges are rounded to pixels. The patch must lie
 /// within the image.
-void upright_patch(const IntegralImage& integral, const Keypoint& keypoint, const Kernels& kernels,
-                   Patch& patch);
+void upright_patch(const IntegralImage& integral, const Keypoint& keypoint,
+                   const SurfKernels& kernels, Patch& patch);
 
 /// The cells along the axes that are turned by the keypoint's angle: squares parallel to the image
 /// around their middles.

@@ -11,10 +11,12 @@
 
 #include "loopbit/gray_image.hpp"
 #include "loopbit/image_shrinker.hpp"
+#include "loopbit/kernels_for.hpp"
 
 #include "hessian_pyramid.hpp"
 #include "integral_image.hpp"
 #include "patch.hpp"
+#include "surf_kernels.hpp"
 
 namespace loopbit {
 namespace {
@@ -58,8 +60,10 @@ bool stronger(const Maximum& a, const Maximum& b) {
 
 class SurfExtractor::Impl {
  public:
-  Impl(const SurfOptions& options, const Kernels& kernels)
-      : options_(options), kernels_(kernels), shrinker_(kernels) {
+  Impl(const SurfOptions& options, InstructionSet instruction_set)
+      : options_(options),
+        kernels_(kernels_for<SurfKernels>(instruction_set)),
+        shrinker_(instruction_set) {
     validate(options, "surf");
   }
 
@@ -226,7 +230,7 @@ class SurfExtractor::Impl {
   }
 
   SurfOptions options_;
-  const Kernels& kernels_;
+  const SurfKernels& kernels_;
   ImageShrinker shrinker_;
   cv::Mat1b working_;
   cv::Mat1b smoothed_;
@@ -243,8 +247,8 @@ class SurfExtractor::Impl {
   Patch patch_{};
 };
 
-SurfExtractor::SurfExtractor(const SurfOptions& options, const Kernels& kernels)
-    : impl_(std::make_unique<Impl>(options, kernels)) {}
+SurfExtractor::SurfExtractor(const SurfOptions& options, InstructionSet instruction_set)
+    : impl_(std::make_unique<Impl>(options, instruction_set)) {}
 SurfExtractor::~SurfExtractor() = default;
 SurfExtractor::SurfExtractor(SurfExtractor&&) noexcept = default;
 SurfExtractor& SurfExtractor::operator=(SurfExtractor&&) noexcept = default;

@@ -9,7 +9,9 @@
 
 #include <opencv2/core.hpp>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/kernels_for.hpp"
+
+#include "epipolar_kernels.hpp"
 
 namespace loopbit {
 
@@ -28,7 +30,8 @@ class EpipolarRansac {
     float y1 = 0;
   };
 
-  explicit EpipolarRansac(const Kernels& kernels) : kernels_(kernels) {}
+  explicit EpipolarRansac(InstructionSet instruction_set)
+      : kernels_(kernels_for<EpipolarKernels>(instruction_set)) {}
 
   /// is_inlier()[i] tells whether pairs[i] lies within `max_error_px` of the geometry, by Sampson's
   /// distance; returns how many do. 0 below 8 pairs, or where no sample determines a geometry.
@@ -46,7 +49,7 @@ class EpipolarRansac {
   [[nodiscard]] cv::Matx33d fit() const;
   void refit();
 
-  const Kernels& kernels_;
+  const EpipolarKernels& kernels_;
   std::vector<float> coordinates_;  ///< about their mean, in units of their spread
   PointPairs pairs_;                ///< in coordinates_
   float max_error_sq_ = 0;

@@ -14,6 +14,27 @@ namespace {
 using Lanes = std::array<Descriptor, kMatchLanes>;
 static_assert(sizeof(Lanes) == kMatchLanes * kDescriptorSize);
 
+/// Appends the neighbours of the first `count` lanes.
+void note(const NearestTwo& nearest, std::size_t count, std::vector<FirstLook::Neighbours>& noted) {
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    noted.push_back(
+        {nearest.index[lane], nearest.distance_sq[lane], nearest.second_distance_sq[lane]});
+  }
+}
+
+/// What note() appended, from number `first` on.
+NearestTwo noted_nearest(const std::vector<FirstLook::Neighbours>& noted, std::size_t first,
+                         std::size_t count) {
+  NearestTwo nearest{};
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    const FirstLook::Neighbours& of_lane = noted[first + lane];
+    nearest.index[lane] = of_lane.index;
+    nearest.distance_sq[lane] = of_lane.distance_sq;
+    nearest.second_distance_sq[lane] = of_lane.second_distance_sq;
+  }
+  return nearest;
+}
+
 bool is_distinct(const NearestTwo& nearest, std::size_t lane, double max_ratio) {
   return nearest.distance_sq[lane] < max_ratio * max_ratio * nearest.second_distance_sq[lane];
 }
@@ -90,7 +111,7 @@ void FeatureMatcher::find_one_way(Descriptors query, std::span<const int> asked,
     const auto lanes = asked.subspan(begin, std::min(kMatchLanes, asked.size() - begin));
     find_nearest(query, lanes, place, nearest);
     keep_distinct(lanes, nearest, max_ratio);
-    if (noted != nullptr) noted->nearest.push_back(nearest);
+    if (noted != nullptr) note(nearest, lanes.size(), noted->nearest);
   }
 }
 
@@ -135,10 +156,9 @@ void FeatureMatcher::match_rest(Descriptors query, Descriptors place, double max
   const Descriptors others = place.subspan(known.num_place);
   const bool has_others = !strongest.empty() && !others.empty();
   if (has_others) find_constants(others);
-  for (std::size_t block = 0; block < known.nearest.size(); ++block) {
-    const std::size_t begin = block * kMatchLanes;
+  for (std::size_t begin = 0; begin < strongest.size(); begin += kMatchLanes) {
     const auto lanes = strongest.subspan(begin, std::min(kMatchLanes, strongest.size() - begin));
-    NearestTwo nearest = known.nearest[block];
+    NearestTwo nearest = noted_nearest(known.nearest, begin, lanes.size());
     if (has_others) {
       NearestTwo among_others;
       find_nearest(query, lanes, others, among_others);

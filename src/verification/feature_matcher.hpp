@@ -7,15 +7,18 @@
 #include <span>
 #include <vector>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/kernels_for.hpp"
 #include "loopbit/verification.hpp"
+
+#include "match_kernels.hpp"
 
 namespace loopbit {
 
 /// match_features() with memory that is kept from pair to pair.
 class FeatureMatcher {
  public:
-  explicit FeatureMatcher(const Kernels& kernels) : kernels_(kernels) {}
+  explicit FeatureMatcher(InstructionSet instruction_set)
+      : kernels_(kernels_for<MatchKernels>(instruction_set)) {}
 
   void match(const Features& query, const Features& place, double max_ratio,
              std::vector<Match>& matches);
@@ -50,7 +53,7 @@ class FeatureMatcher {
   void find_nearest(Descriptors query, std::span<const int> asked, Descriptors place,
                     NearestTwo& nearest) const;
 
-  const Kernels& kernels_;
+  const MatchKernels& kernels_;
   std::vector<std::int32_t> constants_;
   std::vector<int> asked_;      ///< of one group, numbered from its first descriptors
   std::vector<Match> matches_;  ///< so, too

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "loopbit/kernels.hpp"
-
 #include "epipolar_ransac.hpp"
 #include "feature_matcher.hpp"
 
@@ -56,7 +54,8 @@ Range middle(std::vector<float>& values) {
 /// What matches say about two views; keeps its memory from pair to pair.
 class Geometry {
  public:
-  explicit Geometry(const Kernels& kernels = active_kernels()) : ransac_(kernels) {}
+  explicit Geometry(InstructionSet instruction_set = active_instruction_set())
+      : ransac_(instruction_set) {}
 
   void find_inliers(const Features& query, const Features& place, std::span<const Match> matches,
                     double max_error_px, std::vector<Match>& inliers) {
@@ -123,8 +122,8 @@ class Geometry {
 
 class Verifier::Impl {
  public:
-  Impl(const VerificationOptions& options, const Kernels& kernels)
-      : options_(options), matcher_(kernels), geometry_(kernels) {
+  Impl(const VerificationOptions& options, InstructionSet instruction_set)
+      : options_(options), matcher_(instruction_set), geometry_(instruction_set) {
     validate(options, "verification");
   }
 
@@ -172,8 +171,8 @@ class Verifier::Impl {
   Geometry geometry_;
 };
 
-Verifier::Verifier(const VerificationOptions& options, const Kernels& kernels)
-    : impl_(std::make_unique<Impl>(options, kernels)) {}
+Verifier::Verifier(const VerificationOptions& options, InstructionSet instruction_set)
+    : impl_(std::make_unique<Impl>(options, instruction_set)) {}
 Verifier::~Verifier() = default;
 Verifier::Verifier(Verifier&&) noexcept = default;
 Verifier& Verifier::operator=(Verifier&&) noexcept = default;
@@ -202,7 +201,7 @@ void Verifier::find_geometry(const Features& query, const Features& place, Verif
 
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio) {
   std::vector<Match> matches;
-  FeatureMatcher(active_kernels()).match(query, place, max_ratio, matches);
+  FeatureMatcher(active_instruction_set()).match(query, place, max_ratio, matches);
   return matches;
 }
 

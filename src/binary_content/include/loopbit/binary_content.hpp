@@ -5,11 +5,13 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <tuple>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/options.hpp"
 
 namespace loopbit {
@@ -48,6 +50,12 @@ struct BinaryContent {
 /// et al. 2019, section III-B.
 [[nodiscard]] double similarity(const BinaryContent& a, const BinaryContent& b,
                                 int shift_tolerance_columns = 0);
+
+/// overlaps[i] = the most pixels that places[i] shares with one of `queries`; at least as many
+/// overlaps as places. Cost: for each query and place, 512 bytes of AND and bit counts.
+void max_overlaps(std::span<const BinaryContent> queries, std::span<const BinaryContent> places,
+                  std::span<std::uint16_t> overlaps,
+                  InstructionSet instruction_set = active_instruction_set());
 
 struct BinaryContentOptions {
   double gamma = 1.5;

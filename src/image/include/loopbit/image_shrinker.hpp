@@ -8,7 +8,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/instruction_set.hpp"
 
 namespace loopbit {
 
@@ -16,7 +16,8 @@ namespace loopbit {
 /// every processor gives the same pixels.
 class ImageShrinker {
  public:
-  explicit ImageShrinker(const Kernels& kernels = active_kernels()) : kernels_(kernels) {}
+  explicit ImageShrinker(InstructionSet instruction_set = active_instruction_set())
+      : instruction_set_(instruction_set) {}
 
   /// Each pixel of `small` is the rounded mean of its part of `gray`, weighted by the area of each
   /// pixel in that part. Parts end at multiples of 1/256 px if there are more than 256 along an
@@ -35,7 +36,7 @@ class ImageShrinker {
   void find_columns(int pixels, int parts);
   void average(double height, std::uint8_t* means);
 
-  const Kernels& kernels_;
+  InstructionSet instruction_set_;
   std::int64_t pixel_length_ = 1;
   std::vector<Column> columns_;
   std::vector<std::uint32_t> sums_;  ///< column sums within a row of parts, then a 0

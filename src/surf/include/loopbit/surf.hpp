@@ -2,16 +2,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <cstdint>
 #include <memory>
 #include <tuple>
 #include <vector>
 
 #include <opencv2/core.hpp>
 
-#include "loopbit/kernels.hpp"
+#include "loopbit/descriptor.hpp"
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/options.hpp"
 
 namespace loopbit {
@@ -23,9 +22,6 @@ struct Keypoint {
   float scale = 0;      ///< sigma in px; a 9 x 9 box filter has 1.2
   float angle_rad = 0;  ///< 0 for upright features
 };
-
-/// A SURF descriptor: 64 values of a unit vector, times 127 / 0.5, rounded and clamped.
-using Descriptor = std::array<std::int8_t, 64>;
 
 /// Upper limit for the longer side of a working image, which matters for very narrow images.
 inline constexpr int kMaxWorkingSide_px = 16384;
@@ -63,7 +59,7 @@ class SurfExtractor {
  public:
   /// Throws Error (kind option) if `options` are not valid.
   explicit SurfExtractor(const SurfOptions& options = {},
-                         const Kernels& kernels = active_kernels());
+                         InstructionSet instruction_set = active_instruction_set());
   ~SurfExtractor();
   SurfExtractor(const SurfExtractor&) = delete;
   SurfExtractor& operator=(const SurfExtractor&) = delete;
@@ -84,7 +80,7 @@ class SurfExtractor {
 /// Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 2008. The strongest
 /// `max_keypoints` are kept; a grid cell may have at most three times its share of them. Responses
 /// within the noise of 8 bits are dropped, so dark images have fewer features. The same image gives
-/// the same bits with every kernel. Cost: see scripts/bench_surf.
+/// the same bits with every instruction set. Cost: see scripts/bench_surf.
 Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options = {});
 
 }  // namespace loopbit

@@ -1,8 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-// The loops of epipolar geometry, written once and compiled for each instruction set, as those of
-// surf_loops.inc are.
-#include "loopbit/kernels.hpp"
+// Compiled once for each instruction set, as surf_loops.cpp is.
+#include "epipolar_kernels.hpp"
 
 namespace loopbit {
 namespace {
@@ -155,5 +154,15 @@ EpipolarScore epipolar_score(const float* model, const PointPairs& pairs, float 
   return score;
 }
 
+constexpr EpipolarKernels kKernels{solve_samples, epipolar_score};
+
 }  // namespace
+
+template <InstructionSet>
+const EpipolarKernels& EpipolarKernels::compiled_for() {
+  return kKernels;
+}
+template const EpipolarKernels&
+EpipolarKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();
+
 }  // namespace loopbit

@@ -1,73 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-// The kernels without instructions of their own, written once and compiled for each instruction set
-// by the file that includes them. All of it has internal linkage, see kernel_variants.hpp.
-#include "epipolar_loops.inc"
-#include "kernel_variants.hpp"
-#include "surf_loops.inc"
+// Compiled once for each instruction set that has no source of its own, see loopbit_kernels().
+#include "bound_kernels.hpp"
 
 namespace loopbit {
 namespace {
-
-int overlap(const std::uint64_t* a, const std::uint64_t* b) {
-  int set = 0;
-  for (std::size_t word = 0; word < kContentWords; ++word) {
-    set += __builtin_popcountll(a[word] & b[word]);
-  }
-  return set;
-}
-
-#if defined(__ARM_FEATURE_DOTPROD)
-/// SDOT multiplies and adds 16 bytes.
-std::int32_t dot(const std::int8_t* a, const std::int8_t* b) {
-  std::int32_t sum = 0;
-  for (std::size_t k = 0; k < kDescriptorSize; ++k) sum += a[k] * b[k];
-  return sum;
-}
-#else
-/// Two products of at most 127 * 127 fit in 16 bits, of which vectors hold twice as many.
-std::int32_t dot(const std::int8_t* a, const std::int8_t* b) {
-  constexpr std::size_t kHalf = kDescriptorSize / 2;
-  std::int32_t sum = 0;
-  for (std::size_t k = 0; k < kHalf; ++k) {
-    sum += static_cast<std::int16_t>(a[k] * b[k] + a[k + kHalf] * b[k + kHalf]);
-  }
-  return sum;
-}
-#endif
-
-void describe_constants(const std::int8_t* descriptors, std::size_t num_descriptors,
-                        std::int32_t* constants) {
-  for (std::size_t i = 0; i < num_descriptors; ++i) {
-    const std::int8_t* descriptor = descriptors + i * kDescriptorSize;
-    constants[i] = dot(descriptor, descriptor);
-  }
-}
-
-void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
-                 const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest) {
-  for (std::size_t lane = 0; lane < kMatchLanes; ++lane) {
-    const std::int8_t* descriptor = descriptors + lane * kDescriptorSize;
-    const std::int32_t square = dot(descriptor, descriptor);
-    std::int32_t index = 0;
-    std::int32_t best = NearestTwo::kNone;
-    std::int32_t second = NearestTwo::kNone;
-    for (std::size_t i = 0; i < num_others; ++i) {
-      const std::int32_t distance =
-          square + constants[i] - 2 * dot(descriptor, others + i * kDescriptorSize);
-      if (distance < best) {
-        second = best;
-        best = distance;
-        index = static_cast<std::int32_t>(i);
-      } else if (distance < second) {
-        second = distance;
-      }
-    }
-    nearest.index[lane] = index;
-    nearest.distance_sq[lane] = best;
-    nearest.second_distance_sq[lane] = second;
-  }
-}
 
 /// The smaller of a count and one that is packed in 4 bits.
 unsigned smaller(unsigned count, unsigned packed) {
@@ -155,24 +92,14 @@ std::size_t select_records(const std::uint16_t* sums, const std::uint16_t* large
   return num_selected;
 }
 
-constexpr Kernels portable_kernels(std::string_view name) {
-  return {name,
-          max_overlaps<overlap>,
-          reaching_queries,
-          coarse_sums,
-          select_records,
-          describe_constants,
-          nearest_two,
-          add_pixels,
-          linear_row,
-          integral_row,
-          hessian_row,
-          maxima_row,
-          upright_cells,
-          describe,
-          solve_samples,
-          epipolar_score};
-}
+constexpr BoundKernels kKernels{reaching_queries, coarse_sums, select_records};
 
 }  // namespace
+
+template <InstructionSet>
+const BoundKernels& BoundKernels::compiled_for() {
+  return kKernels;
+}
+template const BoundKernels& BoundKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();
+
 }  // namespace loopbit

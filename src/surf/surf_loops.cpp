@@ -1,22 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-// The loops over pixels, most of them of SURF, written once and compiled for each instruction set by
-// the file that includes them: the compiler makes vector code of them, on x86-64 and on Arm alike. All
-// of it has internal linkage, see kernel_variants.hpp. Sums are of integers, or of floats in an order
-// that no vector width changes, and a * b + c is never contracted: every variant returns the same
-// bits.
-#include "loopbit/kernels.hpp"
+// Compiled once for each instruction set, see loopbit_kernels(): the compiler makes vector code of
+// these loops, on x86-64 and on Arm alike. Sums are of integers, or of floats in an order that no
+// vector width changes, and a * b + c is never contracted: every set returns the same bits.
+#include "surf_kernels.hpp"
 
 namespace loopbit {
 namespace {
-
-void add_pixels(const std::uint8_t* __restrict pixels, std::size_t width, std::uint16_t weight,
-                std::uint32_t* __restrict sums) {
-  // 16 bits hold the products, and twice as many of them in a vector.
-  for (std::size_t x = 0; x < width; ++x) {
-    sums[x] += static_cast<std::uint16_t>(pixels[x] * weight);
-  }
-}
 
 void linear_row(const LinearRow& from, std::size_t count, std::uint16_t* __restrict blended,
                 std::uint32_t* __restrict pairs, std::uint8_t* __restrict pixels) {
@@ -342,5 +332,15 @@ void describe(const float* cells, std::int8_t* descriptor) {
   quantize(values, descriptor);
 }
 
+constexpr SurfKernels kKernels{linear_row, integral_row,  hessian_row,
+                               maxima_row, upright_cells, describe};
+
 }  // namespace
+
+template <InstructionSet>
+const SurfKernels& SurfKernels::compiled_for() {
+  return kKernels;
+}
+template const SurfKernels& SurfKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();
+
 }  // namespace loopbit

@@ -4,7 +4,7 @@
 
 #include <immintrin.h>
 
-#include "kernel_variants.hpp"
+#include "bound_kernels.hpp"
 
 namespace loopbit {
 
@@ -70,8 +70,8 @@ static ReachingGroup reaching_group(const std::uint16_t* sums, std::size_t num_q
   return found;
 }
 
-/// Kernels::reaching_queries on top of one variant's Pair, a type of internal linkage for the
-/// reason that kernel_variants.hpp gives: it holds two records, sums the minima in 64-bit lanes, of
+/// BoundKernels::reaching_queries by one instruction set's Pair, a type of internal linkage for the
+/// reason that kernels_for.hpp gives: it holds two records, sums the minima in 64-bit lanes, of
 /// which four queries share the 16-bit quarters, and reduces them to the four sums with the first
 /// record and the four with the second.
 template <typename Pair>
