@@ -52,9 +52,9 @@ struct TruthOptions {
 /// frame. Other rows are never fewer than frames. They may be more, as of a run that ended early,
 /// unless `all_read`, which also refuses later frames in a list.
 ///
-/// Truth without a true place is refused, unless it is by poses, or a list of no rows that names its
-/// columns. Throws Error (kind input) that names file, fault and remedy. A 4541 x 4541 matrix takes
-/// well under a second.
+/// Truth without a true place is refused, unless it is by poses, or a list of no rows that names
+/// its columns. Throws Error (kind input) that names file, fault and remedy. A 4541 x 4541 matrix
+/// takes well under a second.
 GroundTruth read_truth(const std::string& path, const TruthOptions& options = {},
                        const std::vector<std::optional<double>>& times_s = {});
 
