@@ -454,6 +454,8 @@ class EvaluationCommandTest(CommandTest):
             self.assertEqual([row["positives"] for row in json.loads(compared.stdout)], [3, 3])
         loops = (run / "loops.csv").read_text().splitlines(keepends=True)
         (run / "loops.csv").write_text("".join(loops[:7]))  # as of a run that was killed
+        record = json.loads((run / "run.json").read_text())
+        (run / "run.json").write_text(json.dumps({**record, "stopped_by": "running"}))
         self.assertEqual(self.score(run)["positives"], 2)
         self.assertEqual(self.score(run, "--truth", matrix), self.score(run))
 
