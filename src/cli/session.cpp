@@ -36,11 +36,15 @@ int thread_count(int wanted) {
 
 void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
            const std::atomic<bool>& stop) {
-  Progress progress(source.size());
-  const RunListener listener{
-      [&](const Detection& detection) { progress.advance(detection.status == Status::loop); },
-      [&](const std::string& sentence) { progress.report(sentence); }};
-  recorded.detect(source, listener, keep_evidence, stop);
+  {
+    Progress progress(source.size());
+    const RunListener listener{
+        [&](const Detection& detection) { progress.advance(detection.status == Status::loop); },
+        [&](const std::string& sentence) { progress.report(sentence); }};
+    recorded.detect(source, listener, keep_evidence, stop);
+  }
+  const std::string& why = recorded.record().early_end;
+  if (!why.empty()) tell(fmt::format("loopbit: {}\n", why));
 }
 
 /// Returns what went wrong: the run itself is none the worse for it.
@@ -159,9 +163,6 @@ int run_session(Session session, const SessionFlags& flags) {
   try {
     drive(*session.source, recorded, !flags.no_report, stop_requested);
     warn_of_damage(flags.map, recorded.map_damage());
-    if (const auto& why = recorded.record().early_end; !why.empty()) {
-      tell(fmt::format("loopbit: {}\n", why));
-    }
   } catch (const Error& error) {
     try {
       recorded.finish(error.what());

@@ -18,7 +18,7 @@
 namespace loopbit::cli {
 namespace {
 
-std::FILE* const own_stderr = stderr;
+std::FILE* const kOwnStderr = stderr;
 
 #ifdef __GLIBC__  // where stderr is a variable and may be set
 
@@ -69,8 +69,8 @@ void keep_closed_streams_closed() {
 }
 
 void tell(const std::string& text) {
-  (void)std::fputs(printable(text).c_str(), own_stderr);
-  (void)std::fflush(own_stderr);
+  (void)std::fputs(printable(text).c_str(), kOwnStderr);
+  (void)std::fflush(kOwnStderr);
 }
 
 void flush_stdout() {
