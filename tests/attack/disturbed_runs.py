@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 
-from harness import LOOPBIT, Skipped, attack, contents, decided_alike, decisions, rows
+from harness import LOOPBIT, Skipped, attack, contents, decided_alike, decisions, rows, running
 from material import FRAMES, REPOSITORY, TINY, map_rows
 
 
@@ -68,7 +68,7 @@ def signalled_run(case):
     path, command = mapped_run(case, case.folder, "--no-report")
     out, wanted = case.folder / "out", case.random.randrange(FRAMES - 4)
     process = case.start(*command)
-    while process.poll() is None and not (
+    while running(process) and not (
             (out / "loops.csv").exists() and len(rows(out)) >= wanted):
         time.sleep(0.002)
     case.about = case.pick(["SIGINT", "SIGTERM", "SIGHUP"])
@@ -93,7 +93,7 @@ def signalled_watch(case):
     folder.mkdir()
     shutil.copy(case.material.images / "000003.png", folder)
     process = case.start("query", case.material.map, "--watch", folder, "--json")
-    while process.poll() is None and not os.fstat(process.streams[0].fileno()).st_size:
+    while running(process) and not os.fstat(process.streams[0].fileno()).st_size:
         time.sleep(0.002)
     case.about = case.pick(["SIGHUP", "SIGINT", "SIGTERM"])
     process.send_signal(getattr(signal, case.about))

@@ -57,6 +57,11 @@ def contents(path):
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else None
 
 
+def running(process):
+    """True until it ends; leaves it to Try.finish(), which asks what it used."""
+    return os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
+
+
 class Try:
     """One try of an attack: a scratch folder, random numbers of its own, and the faults seen."""
 
