@@ -39,7 +39,7 @@ def killed_run(case):
     path, command = mapped_run(case, case.folder, *case.pick([["--no-report"], []]))
     process = case.start(*command)
     time.sleep(case.random.uniform(0, case.material.run_seconds))
-    process.kill()
+    os.kill(process.pid, signal.SIGKILL)
     case.finish(process)
     check_saved(case, path)
     out = case.folder / "out"
@@ -72,7 +72,7 @@ def signalled_run(case):
             (out / "loops.csv").exists() and len(rows(out)) >= wanted):
         time.sleep(0.002)
     case.about = case.pick(["SIGINT", "SIGTERM", "SIGHUP"])
-    process.send_signal(getattr(signal, case.about))
+    os.kill(process.pid, getattr(signal, case.about))
     ended = case.finish(process)
     case.judge(ended, (0, 130))
     if ended.code == 130:
@@ -96,7 +96,7 @@ def signalled_watch(case):
     while running(process) and not os.fstat(process.streams[0].fileno()).st_size:
         time.sleep(0.002)
     case.about = case.pick(["SIGHUP", "SIGINT", "SIGTERM"])
-    process.send_signal(getattr(signal, case.about))
+    os.kill(process.pid, getattr(signal, case.about))
     ended = case.finish(process)
     case.judge(ended, (0, 130))
     case.expect(len(ended.out.splitlines()) == 1 and json.loads(ended.out), "its answer is lost")

@@ -8,6 +8,7 @@ import pathlib
 import random
 import re
 import resource
+import signal
 import subprocess
 import sys
 import time
@@ -109,7 +110,7 @@ class Try:
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
             if not pid and not late and time.monotonic() - process.begun > max_seconds:
                 late = True
-                process.kill()
+                os.kill(process.pid, signal.SIGKILL)
             elif not pid:
                 time.sleep(0.005)
         process.returncode = os.waitstatus_to_exitcode(status)
