@@ -13,7 +13,7 @@ import subprocess
 import sys
 import time
 
-from harness import LOOPBIT, Skipped, attack, contents, decided_alike, decisions, rows
+from harness import LOOPBIT, Skipped, attack, contents, decided_alike, decisions, rows, running
 from material import FRAMES, REPOSITORY, TINY, map_rows
 
 
@@ -39,7 +39,7 @@ def killed_run(case):
     path, command = mapped_run(case, case.folder, *case.pick([["--no-report"], []]))
     process = case.start(*command)
     time.sleep(case.random.uniform(0, case.material.run_seconds))
-    process.kill()
+    os.kill(process.pid, signal.SIGKILL)
     case.finish(process)
     check_saved(case, path)
     out = case.folder / "out"
@@ -68,11 +68,11 @@ def signalled_run(case):
     path, command = mapped_run(case, case.folder, "--no-report")
     out, wanted = case.folder / "out", case.random.randrange(FRAMES - 4)
     process = case.start(*command)
-    while process.poll() is None and not (
+    while running(process) and not (
             (out / "loops.csv").exists() and len(rows(out)) >= wanted):
         time.sleep(0.002)
     case.about = case.pick(["SIGINT", "SIGTERM", "SIGHUP"])
-    process.send_signal(getattr(signal, case.about))
+    os.kill(process.pid, getattr(signal, case.about))
     ended = case.finish(process)
     case.judge(ended, (0, 130))
     if ended.code == 130:
@@ -93,10 +93,10 @@ def signalled_watch(case):
     folder.mkdir()
     shutil.copy(case.material.images / "000003.png", folder)
     process = case.start("query", case.material.map, "--watch", folder, "--json")
-    while process.poll() is None and not os.fstat(process.streams[0].fileno()).st_size:
+    while running(process) and not os.fstat(process.streams[0].fileno()).st_size:
         time.sleep(0.002)
     case.about = case.pick(["SIGHUP", "SIGINT", "SIGTERM"])
-    process.send_signal(getattr(signal, case.about))
+    os.kill(process.pid, getattr(signal, case.about))
     ended = case.finish(process)
     case.judge(ended, (0, 130))
     case.expect(len(ended.out.splitlines()) == 1 and json.loads(ended.out), "its answer is lost")

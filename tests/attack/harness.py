@@ -8,6 +8,7 @@ import pathlib
 import random
 import re
 import resource
+import signal
 import subprocess
 import sys
 import time
@@ -57,6 +58,11 @@ def contents(path):
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.exists() else None
 
 
+def running(process):
+    """True until it ends; leaves it to Try.finish(), which asks what it used."""
+    return os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
+
+
 class Try:
     """One try of an attack: a scratch folder, random numbers of its own, and the faults seen."""
 
@@ -104,7 +110,7 @@ class Try:
             pid, status, usage = os.wait4(process.pid, os.WNOHANG)
             if not pid and not late and time.monotonic() - process.begun > max_seconds:
                 late = True
-                process.kill()
+                os.kill(process.pid, signal.SIGKILL)
             elif not pid:
                 time.sleep(0.005)
         process.returncode = os.waitstatus_to_exitcode(status)
