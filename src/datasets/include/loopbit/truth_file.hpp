@@ -25,16 +25,15 @@ TruthKind truth_kind(const std::string& path);
 struct TruthOptions {
   PoseTruthOptions poses;
   std::string variable;   ///< of a .mat file; empty = the only square matrix in it
-  int views = 1;          ///< a matrix has so many rows a frame in turn (2: left, right)
-  int every = 1;          ///< of the sequence's frames every so-many-th was read
-  bool all_read = false;  ///< of the frames read, that the sequence has none after them
+  int views = 1;          ///< rows of a matrix per frame (2: left, right)
+  int every = 1;          ///< only every N-th frame of the sequence was read
+  bool all_read = false;  ///< the frames were read to the end of the sequence
 };
 
 /// Reads the ground truth of a sequence. The kind of the file is detected:
 ///  - a .mat file of MATLAB 5 to 7.3: a square matrix, dense (at most 1 GiB) or sparse, of any
 ///    numeric or logical class;
-///  - an image: a square mask, true where it is not black; not JPEG, which does not keep black
-///  exact;
+///  - an image: a square mask, true where it is not black; not JPEG, which changes black;
 ///  - text of 12, 8 or 17 numbers per row: poses, see poses.hpp;
 ///  - text of `query,first,last` or `query,match` rows, see ground_truth.hpp;
 ///  - text with as many numbers per row as rows (at least 13): a square matrix.
@@ -43,18 +42,18 @@ struct TruthOptions {
 /// k is rows n k to n k + n - 1, and two frames show the same place if any of their views do. At
 /// most 100,000 rows are read.
 ///
-/// Truth has the numbers of the whole sequence, and `every` of the options. Where a matrix has n
-/// views and only every n-th image was read (the left ones of pairs in turn), its frames are those
-/// read; other numbers that n does not divide fit no matrix of views.
+/// Truth counts the frames of the whole sequence, and has `every` of the options. If a matrix has n
+/// views and only every n-th image was read (the left ones of alternating pairs), its frames are
+/// the images read. Other values of `every` above 1 must be multiples of n.
 ///
-/// `times_s`: the times of the frames read, one a frame, where they are known (0 frames = not
-/// known). A trajectory goes by time where any frame has one, and by number, a row a frame of the
-/// whole sequence, where they are known to have none: then the trajectory must have one for each
-/// frame. Other rows are never fewer than frames. They may be more, as of a run that ended early,
-/// unless `all_read`, which also refuses later frames in a list.
+/// `times_s` has the time of each frame read, if known (empty = the frames are unknown). A
+/// trajectory is matched by time if any frame has one. If the frames have no times, it is matched
+/// by number and must have one row per frame of the whole sequence. Other files must not have fewer
+/// rows than frames. They may have more, as for a run that ended early, unless `all_read` is set,
+/// which also refuses later frames in a list.
 ///
 /// Truth without a true place is refused, unless it is by poses, or a list of no rows that names
-/// its columns. Throws Error (kind input) that names file, fault and remedy. A 4541 x 4541 matrix
+/// its columns. Throws Error (kind input) with file, fault and remedy. A 4541 x 4541 matrix
 /// takes well under a second.
 GroundTruth read_truth(const std::string& path, const TruthOptions& options = {},
                        const std::vector<std::optional<double>>& times_s = {});

@@ -10,41 +10,41 @@
 
 namespace loopbit {
 
-/// What there is in a map, and what of it is damaged.
+/// The content of a map and its damage.
 struct MapCheck {
   std::int64_t sessions = 0;
-  std::int64_t places = 0;  ///< whole, with their features
+  std::int64_t places = 0;  ///< undamaged places with their features
   std::int64_t loops = 0;
-  std::int64_t images = 0;               ///< whole
-  std::vector<std::string> damage = {};  ///< a clause a thing; empty if all is well
+  std::int64_t images = 0;               ///< undamaged images
+  std::vector<std::string> damage = {};  ///< one clause each; empty if there is none
 };
 
-/// Reads every byte of a map. Throws Error (kind input) as MapReader does.
+/// Checks a map by reading every byte. Throws Error (kind input) as MapReader does.
 MapCheck check_map(const std::string& path);
 
 struct MergeCounts {
   std::int64_t sessions = 0;  ///< copied
   std::int64_t places = 0;    ///< copied
   std::int64_t loops = 0;     ///< copied
-  std::int64_t known = 0;     ///< sessions that were there before, told by their uid
+  std::int64_t known = 0;     ///< sessions that `into` already had, compared by uid
 };
 
-/// Adds to the map `into`, made if there is none, the sessions of `from` that it lacks, with their
-/// places and loops; all of them or nothing. Throws Error: kind output if `into` has a writer or
+/// Copies the sessions of `from` that `into` lacks, with their places and loops, completely or not
+/// at all. Creates `into` if there is none. Throws Error: kind output if `into` has a writer or
 /// cannot be written; option if the two were made with different settings; input if `from` is
 /// damaged or being written.
 MergeCounts merge_map(const std::string& into, const std::string& from);
 
-/// Copies what is whole of a damaged map to a new one, under the same numbers. A session whose
-/// description is lost is called "recovered". A map that version 1 began loses its images with its
+/// Copies all undamaged rows of a map to a new map, under the same numbers. A session whose
+/// description is lost is named "recovered". A map begun by version 1 loses its images with its
 /// first page. Throws Error: kind output if `to` exists or cannot be written, input if there is
-/// nothing to copy or `from` is of a newer version. What fails leaves no file.
+/// nothing to copy or `from` is of a newer version. No file remains after an error.
 MapCheck recover_map(const std::string& from, const std::string& to);
 
 struct CompactOptions {
-  std::vector<int> drop_sessions;  ///< with their places and loops
-  std::int64_t max_places = 0;     ///< the least missed are removed beyond that; 0 = none
-  bool drop_images = false;        ///< all of them; places stay
+  std::vector<int> drop_sessions;  ///< sessions to drop, with their places and loops
+  std::int64_t max_places = 0;     ///< the most redundant are dropped above this; 0 = no limit
+  bool drop_images = false;        ///< drops all images, but no places
 };
 
 struct CompactCounts {
@@ -54,16 +54,16 @@ struct CompactCounts {
   std::uintmax_t bytes_after = 0;
 };
 
-/// Forgets sessions, redundant places and images, and gives their space back. The new file replaces
-/// the old one in one step, so that no crash leaves half of it; it needs room for both. Throws
-/// Error: kind option for a session that is not there; output if the map is read or written by
-/// others, or cannot be written; input if it is damaged.
+/// Drops sessions, redundant places and images, and frees their space. The new file replaces the
+/// old one in one step, so a crash leaves a complete map. It needs space for both files. Throws
+/// Error: kind option for a session that does not exist; output if others read or write the map, or
+/// it cannot be written; input if it is damaged.
 CompactCounts compact_map(const std::string& path, const CompactOptions& options);
 
 enum class ExportFormat { csv, json, g2o };
 
-/// The loops of a map as edges of a graph; docs/format.md describes the formats. Frames are
-/// numbered through all sessions, in order of session.
+/// The loops of a map as text; docs/format.md describes the formats. Frames are numbered
+/// consecutively through all sessions.
 std::string export_loops(MapReader& map, ExportFormat format);
 
 }  // namespace loopbit
