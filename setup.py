@@ -4,17 +4,12 @@
 
 CMAKE_ARGS holds more arguments for CMake, separated as in a shell. LOOPBIT_BUILD_DIR names a build
 folder to build in, so that what is compiled there is not compiled again.
-
-The report page is built with npm, which needs a network once. Where that is not possible the package
-is built without it, and write_report() says so; -DLOOPBIT_BUILD_REPORT=ON in CMAKE_ARGS makes it an
-error, and OFF leaves the page out.
 """
 
 import os
 import pathlib
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 
@@ -31,7 +26,7 @@ class BuildWithCMake(build_ext):
         build = os.environ.get("LOOPBIT_BUILD_DIR")
         if build is None:
             build = pathlib.Path(self.build_temp).resolve()
-            configure_with_page_if_possible(build)
+            configure(build)
         jobs = self.parallel or os.cpu_count()
         cmake("--build", build, "--target", "loopbit_python", "--parallel", jobs)
         target = pathlib.Path(self.get_ext_fullpath(ext.name))
@@ -39,27 +34,11 @@ class BuildWithCMake(build_ext):
         self.copy_file(str(pathlib.Path(build) / "python/loopbit" / target.name), str(target))
 
 
-def configure_with_page_if_possible(build):
-    if "LOOPBIT_BUILD_REPORT" in os.environ.get("CMAKE_ARGS", ""):
-        configure(build)
-        return
-    reason = "there is no Node.js with npm"
-    if shutil.which("node") and shutil.which("npm"):
-        configure(build, "-DLOOPBIT_BUILD_REPORT=ON")
-        try:
-            cmake("--build", build, "--target", "loopbit_report_page")
-            return
-        except subprocess.CalledProcessError:
-            reason = "npm could not build it, as it says above"
-    print(f"loopbit: leaving out the report page: {reason}.", file=sys.stderr)
-    configure(build, "-DLOOPBIT_BUILD_REPORT=OFF")
-
-
-def configure(build, *arguments):
+def configure(build):
     cmake("-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
           "-DLOOPBIT_BUILD_PYTHON=ON", "-DLOOPBIT_BUILD_CLI=OFF", "-DLOOPBIT_BUILD_TESTS=OFF",
           "-DLOOPBIT_BUILD_BENCHMARKS=OFF", f"-DPython3_EXECUTABLE={sys.executable}",
-          *installed_pybind11(), *arguments, *shlex.split(os.environ.get("CMAKE_ARGS", "")))
+          *installed_pybind11(), *shlex.split(os.environ.get("CMAKE_ARGS", "")))
 
 
 def installed_pybind11():

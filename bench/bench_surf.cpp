@@ -199,7 +199,7 @@ double detector_mean_ms(const fs::path& folder) {
     all.insert(all.end(), frames.begin(), frames.end());
   }
   std::sort(all.begin(), all.end());
-  fmt::print("{}: mean {:.2f} ms a frame, p99 {:.2f} ms\n",
+  fmt::print("{}: mean {:.2f} ms per frame, p99 {:.2f} ms\n",
              folder.parent_path().filename().string(), median(means), all[all.size() * 99 / 100]);
   return median(means);
 }

@@ -20,7 +20,7 @@ set(summary "visual loop closure detection via binary content")
 set(CPACK_DEBIAN_LIB_PACKAGE_NAME libloopbit${abi})
 set(CPACK_DEBIAN_LIB_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_LIB_DESCRIPTION "${summary}: the detector
- Tells a robot, image by image, whether it has been here before.")
+ Detects visual loop closures in a sequence of camera images.")
 
 set(CPACK_DEBIAN_MAP_PACKAGE_NAME libloopbit-map${abi})
 set(CPACK_DEBIAN_MAP_PACKAGE_SECTION libs)

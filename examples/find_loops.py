@@ -11,5 +11,6 @@ def show(found):
         print(f"{found.frame} is {found.match}, score {found.score:g}")
 
 
-# A frame that cannot be used is told, counted, and passed over.
-loopbit.run(sys.argv[1], on_detection=show, on_bad_frame=lambda told: print(told, file=sys.stderr))
+# An unusable frame is reported, counted and skipped.
+loopbit.run(sys.argv[1], on_detection=show,
+            on_bad_frame=lambda message: print(message, file=sys.stderr))

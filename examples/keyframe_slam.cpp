@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 //
-// Loop closure beside a keyframe SLAM: the tracker hands over its keyframes and goes on; a thread
-// of its own finds the loops and hands them to the back end. Here the "tracker" takes every third
-// image of a sequence as a keyframe, and the "back end" prints the edge it would add to its pose
-// graph.
+// Loop closure in a keyframe SLAM. The tracker passes its keyframes on and continues. A separate
+// thread finds the loops and passes them to the back end. Here the "tracker" takes every third
+// image of a sequence as a keyframe, and the "back end" prints the edge that it would add to its
+// pose graph.
 //
 //   keyframe_slam INPUT    INPUT as in `loopbit run`
 #include <condition_variable>
@@ -30,15 +30,15 @@ struct Keyframe {
   cv::Mat image;
 };
 
-/// Finds loops among keyframes, in the order in which they are added, without holding up whoever
-/// adds them. `on_loop(query, match, score)` is called from its thread.
+/// Finds loops among keyframes in the order in which they are added. add() does not wait for the
+/// detection. `on_loop(query, match, score)` is called from the worker thread.
 class LoopCloser {
  public:
   using OnLoop = std::function<void(KeyframeId, KeyframeId, double)>;
 
   explicit LoopCloser(OnLoop on_loop) : on_loop_(std::move(on_loop)), thread_([this] { work(); }) {}
 
-  /// Finishes what was added.
+  /// Processes all keyframes that were added, then stops.
   ~LoopCloser() {
     {
       const std::scoped_lock lock(mutex_);
@@ -73,7 +73,7 @@ class LoopCloser {
     }
   }
 
-  /// A keyframe that cannot be used is told and counted, so that numbers keep step.
+  /// Reports and skips an unusable keyframe, so that frame numbers stay aligned.
   loopbit::Detection process(const Keyframe& keyframe) {
     try {
       return detector_.process(keyframe.image);
@@ -85,7 +85,7 @@ class LoopCloser {
 
   void detect(const Keyframe& keyframe) {
     const loopbit::Detection found = process(keyframe);
-    // loopbit numbers places 0, 1, 2, ...; the back end has names of its own for them.
+    // loopbit numbers frames 0, 1, 2, ...; the back end has its own ids.
     ids_.push_back(keyframe.id);
     if (found.status == loopbit::Status::loop) {
       on_loop_(keyframe.id, ids_[static_cast<std::size_t>(*found.match)], found.score);

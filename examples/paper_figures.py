@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Runs a sequence with a truth, prints its score, and draws the figures of a paper as PDF:
+"""Runs a sequence with ground truth, prints its score, and draws figures for a paper as PDF:
 
     paper_figures.py IMAGES TRUTH OUT [POSES]
 """

@@ -1,10 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 //
-// Relocalisation: a robot that starts anywhere in a mapped place asks the old map which of its
-// places each image shows. Nothing is added to the map.
+// Relocalisation: a robot starts anywhere in a mapped area and looks up each image in the old map.
+// Nothing is added to the map.
 //
-//   relocalise MAP INPUT    MAP as `loopbit run --map` makes it, INPUT as `loopbit run` takes it
+//   relocalise MAP INPUT    MAP as written by `loopbit run --map`, INPUT as in `loopbit run`
 #include <iostream>
 #include <memory>
 #include <optional>

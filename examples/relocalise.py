@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Tells which places of a map the images of a sequence show: relocalise.py MAP INPUT"""
+"""Looks up the images of a sequence in a map: relocalise.py MAP INPUT"""
 import sys
 
 import loopbit

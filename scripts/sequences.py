@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""The sequences that loopbit is measured on, and how to run it on them."""
+"""The sequences of the benchmarks, and a runner for them."""
 
 import argparse
 import json
@@ -11,7 +11,7 @@ import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
-# name: input, truth, matches that are not wrong, queries that are not scored
+# name: input, truth, matches that are not false, queries that are not scored
 REAL = {
     "corridor_loop": ("corridor_loop/images", "corridor_loop/truth.csv",
                       "corridor_loop/not_false.csv", "corridor_loop/ignore.csv"),
@@ -65,7 +65,7 @@ class Runner:
         _, truth, not_false, ignore = REAL[name]
         if truth is None:  # a drive without revisit: every loop is wrong
             truth = self.scratch / "none.csv"
-            truth.write_text("# no revisit\n")
+            truth.write_text("query,first,last\n")
         flags = []
         for flag, file in (("--truth", truth), ("--not-false", not_false), ("--ignore", ignore)):
             if file:

@@ -3,11 +3,11 @@
 # SPDX-License-Identifier: MIT
 """Runs clang-tidy over the sources of the library and the command in a finished build.
 
-A source is skipped while all that decides its result is as it was when it last passed: its
-command, the .clang-tidy file, clang-tidy itself, and the content of each of our files it includes
-(as the compiler reported them to Ninja). The rest is checked several sources at a time, because most
-of the time goes into the headers that they share. Tests, benchmarks and the Python module, and the
-static analyzer, which take three times as long, are for --all, which takes one source at a time.
+A source is skipped if nothing that affects its result has changed since it last passed: its
+compile command, the .clang-tidy file, clang-tidy itself, and the content of our files that it
+includes (as the compiler reported them to Ninja). The others are checked several at a time, because
+they share most of the time for headers. --all also checks tests, benchmarks and the Python module,
+and runs the static analyzer. It takes three times as long and checks one source at a time.
 """
 
 import argparse
@@ -23,8 +23,8 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 TIDY = "clang-tidy-14"
-# The static analyzer takes as long as all other checks, and a minute for a test of many cases; the
-# others named here take a quarter of the rest, for faults that are seldom.
+# The static analyzer takes as long as all other checks, and a minute for a large test. The other
+# checks listed here take a quarter of the remaining time and find rare faults.
 QUICK = ["--checks=-clang-analyzer-*,-bugprone-reserved-identifier,-bugprone-stringview-nullptr,"
          "-bugprone-suspicious-string-compare,-bugprone-multiple-statement-macro,"
          "-modernize-use-transparent-functors,-modernize-deprecated-ios-base-aliases"]

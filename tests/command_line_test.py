@@ -3,6 +3,7 @@
 # SPDX-License-Identifier: MIT
 """The loopbit command as a user meets it: what it writes, says and exits with."""
 
+import contextlib
 import json
 import os
 import pathlib
@@ -11,10 +12,13 @@ import re
 import resource
 import shutil
 import signal
+import sqlite3
+import struct
 import subprocess
 import tempfile
 import time
 import unittest
+import zlib
 
 from loopbit_command import (FRAMES, LOOPBIT, QUICK, WORLD, CommandTest, decisions, loopbit, rows)
 
@@ -181,6 +185,97 @@ class CommandLineTest(CommandTest):
         self.assertIn("None of the 1 frames", ran.stderr)
         self.assertEqual(rows(self.out)[0]["status"], "unreadable")
 
+    def pictures(self):
+        """The reference run's small JPEG pictures of its frames."""
+        with contextlib.closing(sqlite3.connect(self.reference / "evidence.db")) as evidence:
+            return [row[0] for row in evidence.execute("SELECT picture FROM frame")]
+
+    def test_libraries_print_nothing_of_damaged_images(self):
+        folder = self.few_images(3)
+        whole = (folder / "000001.png").read_bytes()
+        middle = len(whole) // 2
+        (folder / "000001.png").write_bytes(whole[:middle] + b"damage" + whole[middle + 6:])
+        ran = loopbit("run", folder, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertRegex(ran.stderr, r"^loopbit: Frame 1: .*000001\.png.*\n$")
+        for image in folder.iterdir():
+            image.unlink()
+        for number, jpeg in enumerate(self.pictures()[:3]):
+            middle = len(jpeg) // 2
+            (folder / f"{number}.jpg").write_bytes(jpeg[:middle] + jpeg[middle + 50:])
+        ran = loopbit("run", folder, "--out", self.scratch / "jpeg")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(ran.stderr, "", "libjpeg makes something of them")
+        video = self.scratch / "v.mp4"
+        video.write_bytes(b"\0\0\0\x10ftypisom\0\0\2\0\0\0\1\0mdat" + bytes(1000))
+        ran = loopbit("run", video, "--out", self.scratch / "mp4")
+        self.assertEqual(ran.returncode, 3)
+        self.assertRegex(ran.stderr, r"^loopbit: '.*v\.mp4' is not a video .*\n$")
+
+    def test_large_images_are_refused_by_their_headers(self):
+        folder = self.few_images(3)
+        header = struct.pack(">4sIIBBBBB", b"IHDR", 60000, 20000, 8, 2, 0, 0, 0)
+        checked = header + struct.pack(">I", zlib.crc32(header))
+        (folder / "000001.png").write_bytes(b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + checked +
+                                            struct.pack(">I4sI", 0, b"IEND", 0xAE426082))
+        ran = loopbit("run", folder, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertRegex(ran.stderr, r"^loopbit: Frame 1: .*000001\.png.* 60000 x 20000 pixels, but "
+                                     r"max_megapixels is 100: .*\n$")
+        ran = loopbit("run", folder, "--out", self.out, "--overwrite", "--max-megapixels", 1200)
+        self.assertIn("damaged", ran.stderr)
+
+    def test_a_video_that_is_cut_off_says_so(self):
+        def chunk(name, *parts):
+            data = b"".join(parts)
+            return name + struct.pack("<I", len(data)) + data + bytes(len(data) % 2)
+
+        jpegs = self.pictures()[:20]
+        header = struct.pack("<14I", 100000, 0, 0, 0, len(jpegs), 0, 1, 0, 256, 192, 0, 0, 0, 0)
+        stream = b"vidsMJPG" + struct.pack("<IHH8I4H", 0, 0, 0, 0, 1, 10, 0, len(jpegs), 0,
+                                           0xFFFFFFFF, 0, 0, 0, 256, 192)
+        picture = struct.pack("<IiiHH4sIiiII", 40, 256, 192, 1, 24, b"MJPG", 147456, 0, 0, 0, 0)
+        headers = chunk(b"LIST", b"hdrl", chunk(b"avih", header),
+                        chunk(b"LIST", b"strl", chunk(b"strh", stream), chunk(b"strf", picture)))
+        movie = chunk(b"LIST", b"movi", *(chunk(b"00dc", jpeg) for jpeg in jpegs))
+        video = self.scratch / "v.avi"
+        whole = chunk(b"RIFF", b"AVI ", headers, movie)
+        for name, size in {"whole": len(whole), "cut": len(whole) // 2}.items():
+            with self.subTest(name):
+                video.write_bytes(whole[:size])
+                ran = loopbit("run", video, "--out", self.out, "--overwrite")
+                self.assertEqual(ran.returncode, 0, ran.stderr)
+                told = json.loads((self.out / "run.json").read_text())["input"].get("early_end")
+                if name == "whole":
+                    self.assertEqual([len(rows(self.out)), told, ran.stderr], [20, None, ""])
+                else:
+                    self.assertLess(len(rows(self.out)), 20)
+                    self.assertEqual(ran.stderr, f"loopbit: {told}\n")
+                    self.assertIn(f"'{video}' is cut off after {size} of", told)
+                self.assertEqual("cut off" in ran.stdout, name == "cut")
+
+    def test_only_regular_files_are_waited_for(self):
+        for name in ("v.avi", "v.png", "list.txt"):
+            pipe = self.scratch / name
+            os.mkfifo(pipe)
+            self.assert_fails(loopbit("run", pipe, "--out", self.out), 3, pipe, "neither a file")
+        listed = self.scratch / "images.txt"
+        device = self.scratch / "device.png"
+        device.symlink_to("/dev/zero")
+        listed.write_text(f"v.png\ndevice.png\n{self.images / '000000.png'}\n")
+        ran = loopbit("run", listed, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        for name in ("v.png", "device.png"):
+            self.assertIn(f"{name}' is a folder, a pipe or a device", ran.stderr)
+
+    def test_no_more_threads_than_cores_to_run_on(self):
+        core = {next(iter(os.sched_getaffinity(0)))}
+        ran = loopbit("run", self.few_images(3), "--out", self.out, "--threads", 2,
+                      preexec_fn=lambda: os.sched_setaffinity(0, core))
+        self.assertEqual([ran.returncode, ran.stderr], [0, ""])
+        self.assertIn("with 1 thread;", ran.stdout)
+        self.assertEqual(json.loads((self.out / "run.json").read_text())["threads"], 1)
+
     # Bad input, output and options: one sentence, an exit code, nothing lost.
 
     def test_missing_input(self):
@@ -227,16 +322,18 @@ class CommandLineTest(CommandTest):
     def test_a_data_set_is_no_earlier_run(self):
         folder = self.scratch / "town"
         folder.mkdir()
-        truth = pathlib.Path(shutil.copy(self.dataset / "truth.csv", folder))
+        truth = folder / "truth.csv"
+        truth.write_text("5,1\n")
         ran = loopbit("run", self.few_images(), "--out", folder, "--no-report", "--truth", truth,
                       "--overwrite")
         self.assert_fails(ran, 4, folder, "truth.csv")
-        self.assertEqual(truth.read_bytes(), (self.dataset / "truth.csv").read_bytes())
+        self.assertEqual(truth.read_text(), "5,1\n")
         self.assertEqual(list(folder.iterdir()), [truth])
 
     def test_what_a_run_reads_is_not_replaced_by_it(self):
         few = self.few_images()
-        truth = self.dataset / "truth.csv"
+        truth = self.scratch / "truth.csv"
+        truth.write_text("5,1\n")
         run = ["run", few, "--out", self.out, "--no-report", "--truth"]
         self.assertEqual(loopbit(*run, truth).returncode, 0)
         own = self.out / "truth.csv"
@@ -314,9 +411,25 @@ class CommandLineTest(CommandTest):
         self.assertEqual(ran.returncode, 0, ran.stderr)
         self.assertIn("\ufffd", json.loads((self.out / "run.json").read_text())["input"]["path"])
         os.rename(self.out, folder + b"_run")
+        truth = self.scratch / "truth.csv"
+        truth.write_text("2,0\n")
         ran = subprocess.run([LOOPBIT, "compare", "--json", folder + b"_run", folder + b"_run",
-                              "--truth", self.dataset / "truth.csv"], capture_output=True)
+                              "--truth", truth], capture_output=True)
         self.assertEqual(ran.returncode, 0, ran.stderr)
+
+    def test_names_do_not_steer_the_terminal(self):
+        folder = self.few_images(3)
+        (folder / "z\x1b[31m\r\x9b.png").write_text("no image")
+        ran = loopbit("run", folder, "--out", self.scratch / "out\x1b[2J")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn("z\\x1b[31m\\x0d\\xc2\\x9b.png", ran.stderr)
+        self.assertIn("out\\x1b[2J", ran.stdout)
+        missing = loopbit("eval", "no\x1b[2J", "--truth", "no\x1b[2J")
+        self.assert_fails(missing, 3, "no\\x1b[2J")
+        unknown = loopbit("eval", self.reference, "more\x1b[2J")
+        self.assertEqual(unknown.returncode, 2)
+        for text in (ran.stdout, ran.stderr, missing.stderr, unknown.stderr):
+            self.assertNotRegex(text, "[\x00-\x09\x0b-\x1f\x7f-\x9f]")
 
     def test_times_are_needed_where_a_setting_is_in_seconds(self):
         ran = loopbit("run", self.few_images(), "--out", self.out, "--set", "exclusion.seconds=5")
@@ -354,8 +467,8 @@ class CommandLineTest(CommandTest):
     def test_full_disk_keeps_whole_rows(self):
         # So many that their rows take more than what run.json begins with.
         images = self.scratch / "images.txt"
-        images.write_text("".join(f"{image}\n" for image in self.few_images().iterdir()) * 10)
-        ran = self.run_on_small_disk(images, 3000, "--no-report")
+        images.write_text("".join(f"{image}\n" for image in self.few_images().iterdir()) * 30)
+        ran = self.run_on_small_disk(images, 20_000, "--no-report")
         self.assert_fails(ran, 4, "loops.csv", "rows before are kept")
         text = (self.out / "loops.csv").read_text()
         self.assertTrue(text.endswith("\n"))
@@ -369,6 +482,36 @@ class CommandLineTest(CommandTest):
         self.assert_fails(ran, 4, "evidence.db", "free space", "--no-report")
         self.assertGreater(len(rows(self.out)), 0)
         self.assertIn("evidence.db", json.loads((self.out / "run.json").read_text())["stopped_by"])
+
+    def test_a_full_disk_costs_no_earlier_run(self):
+        few = self.few_images(3)
+        self.assertEqual(loopbit("run", few, "--out", self.out, "--no-report").returncode, 0)
+        before = {file: file.read_bytes() for file in self.out.iterdir()}
+        for bytes_left in (40, 2000):
+            ran = self.run_on_small_disk(few, bytes_left, "--no-report", "--overwrite")
+            self.assert_fails(ran, 4, self.out)
+            self.assertEqual({file: file.read_bytes() for file in self.out.iterdir()}, before)
+
+    def test_how_a_run_ends_on_a_full_disk_is_kept(self):
+        self.out.mkdir()
+        mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", self.out],
+                                 capture_output=True, text=True)
+        if mounted.returncode != 0:
+            self.skipTest(f"no small disk here: {mounted.stderr}")
+        try:
+            few = self.few_images()
+            ran = loopbit("run", few, "--out", self.out)
+            self.assert_fails(ran, 4, self.out)
+            record = json.loads((self.out / "run.json").read_text())
+            self.assertEqual(ran.stderr, f"loopbit: {record['stopped_by']}\n")
+            with contextlib.suppress(OSError), open(self.out / "filler", "wb", 0) as filler:
+                while filler.write(bytes(512)):
+                    pass
+            before = {file: file.read_bytes() for file in self.out.iterdir()}
+            self.assert_fails(loopbit("run", few, "--out", self.out, "--overwrite"), 4, self.out)
+            self.assertEqual({file: file.read_bytes() for file in self.out.iterdir()}, before)
+        finally:
+            subprocess.run(["umount", self.out], check=True)
 
     def test_bad_settings(self):
         cases = [
@@ -408,9 +551,9 @@ class CommandLineTest(CommandTest):
         for arguments, words in ((["walk"], "no command 'walk'"), (["--foo"], "no option '--foo'"),
                                  (["map", "lst", "x.db"], "no command 'lst'"),
                                  (["map", "--foo"], "no option '--foo'"),
-                                 ([*run, "--every", "2.5"], "'2.5' is no whole number from 1"),
-                                 ([*run, "--limit", "-1"], "'-1' is no whole number from 0"),
-                                 ([*run, "--pictures-mb", "nan"], "'nan' is no number from 0")):
+                                 ([*run, "--every", "2.5"], "'2.5' is not a whole number from 1"),
+                                 ([*run, "--limit", "-1"], "'-1' is not a whole number from 0"),
+                                 ([*run, "--pictures-mb", "nan"], "'nan' is not a number from 0")):
             with self.subTest(arguments):
                 ran = loopbit(*arguments)
                 self.assertEqual(ran.returncode, 2, ran.stderr)
@@ -439,18 +582,44 @@ class CommandLineTest(CommandTest):
             self.assert_fails(ran, 2, flags[0], "--write-images")
         self.assertFalse((self.scratch / "town").exists())
 
-    def test_ctrl_c_ends_cleanly_and_keeps_what_was_found(self):
-        process = subprocess.Popen([LOOPBIT, "run", self.images, "--out", self.out],
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    def interrupted_run(self, number, images=None, **options):
+        process = subprocess.Popen([LOOPBIT, "run", images or self.images, "--out", self.out],
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   **options)
         loops = self.out / "loops.csv"
         deadline = time.monotonic() + 60
         while time.monotonic() < deadline:
             if loops.exists() and len(loops.read_text().splitlines()) > FRAMES // 8:
                 break
             time.sleep(0.005)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         output, errors = process.communicate(timeout=60)
-        self.assertEqual(process.returncode, 130, errors)
+        return process.returncode, output, errors
+
+    def test_what_libraries_printed_is_shown_when_the_process_aborts(self):
+        images = self.scratch / "images"
+        shutil.copytree(self.images, images)
+        whole = (images / "000001.png").read_bytes()
+        middle = len(whole) // 2
+        (images / "000001.png").write_bytes(whole[:middle] + b"damage" + whole[middle + 6:])
+        code, _, errors = self.interrupted_run(signal.SIGABRT, images)
+        self.assertEqual(code, -signal.SIGABRT, errors)
+        self.assertRegex(errors, r"\nlibpng error: .*\n$")
+
+    def test_a_hangup_that_is_ignored_ends_nothing(self):
+        code, _, errors = self.interrupted_run(
+            signal.SIGHUP, preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+        self.assertEqual(code, 0, errors)
+        self.assertEqual(len(rows(self.out)), FRAMES)
+
+    def test_signals_end_cleanly_and_keep_what_was_found(self):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            with self.subTest(number):
+                shutil.rmtree(self.out, ignore_errors=True)
+                self.check_interrupted(*self.interrupted_run(number))
+
+    def check_interrupted(self, code, output, errors):
+        self.assertEqual(code, 130, errors)
         self.assertIn("interrupted", output)
         record = json.loads((self.out / "run.json").read_text())
         self.assertEqual(record["stopped_by"], "interrupt")

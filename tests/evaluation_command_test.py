@@ -47,6 +47,55 @@ class EvaluationCommandTest(CommandTest):
 
     # eval
 
+    def test_truth_that_says_nothing_is_refused(self):
+        matches = self.file("other.csv", "5,1,0.9\n")
+        for text in ("hello world\n", "", "# nothing\n"):
+            with self.subTest(text):
+                truth = self.file("truth.csv", text)
+                self.assert_fails(loopbit("eval", matches, "--truth", truth), 3, truth,
+                                  "query,first,last")
+        truth = self.file("truth.csv", "query,first,last\n")
+        self.assertEqual(self.score(matches, "--truth", truth)["wrong"], 1)
+        empty = self.file("empty.csv", "")
+        self.score(matches, "--truth", truth, "--not-false", empty, "--ignore", empty)
+        self.assert_fails(loopbit("eval", matches, "--truth", truth, "--not-false",
+                                  self.file("words.csv", "hello world\n")), 3, "words.csv")
+
+    def test_truth_of_frames_that_the_run_does_not_have_is_refused(self):
+        images = self.few_images(3)
+        poses = self.file("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n" * 5)
+        later = self.file("later.csv", "3,0,1\n")
+        for truth, words in ((poses, ("5 poses", "3 frames")), (later, ("frame 3", "3 frames"))):
+            with self.subTest(truth=truth):
+                ran = loopbit("run", images, "--out", self.out, "--truth", truth)
+                self.assert_fails(ran, 3, truth, *words)
+                self.assertFalse(self.out.exists(), "told before the run")
+        ran = loopbit("run", images, "--out", self.out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assert_fails(loopbit("eval", self.out, "--truth", poses), 3, poses, "5 poses")
+        part = self.scratch / "part"
+        ran = loopbit("run", images, "--out", part, "--limit", 2, "--truth", poses)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.score(part, "--truth", later)
+
+    def test_pipes_and_devices_are_not_waited_for(self):
+        pipe = self.scratch / "pipe.csv"
+        os.mkfifo(pipe)
+        truth = self.dataset / "truth.csv"
+        matches = self.file("other.csv", "5,1,0.9\n")
+        for name in (pipe, "/dev/zero"):
+            for command in (["eval", name, "--truth", truth], ["eval", matches, "--truth", name],
+                            ["eval", matches, "--truth", truth, "--not-false", name],
+                            ["eval", matches, "--truth", truth, "--ignore", name],
+                            ["run", self.images, "--out", self.out, "--config", name],
+                            ["run", self.images, "--out", self.out, "--poses", name]):
+                with self.subTest(command=command):
+                    self.assert_fails(loopbit(*command, timeout=20), 3, name, "pipe or a device")
+        shutil.copytree(self.reference, self.out)
+        (self.out / "run.json").unlink()
+        os.mkfifo(self.out / "run.json")
+        self.assert_fails(loopbit("eval", self.out, timeout=20), 3, "run.json", "pipe")
+
     def test_a_run_folder_is_scored_as_its_run_was(self):
         record = json.loads((self.reference / "run.json").read_text())["score"]
         scored = self.score(self.reference)

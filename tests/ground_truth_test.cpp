@@ -22,12 +22,15 @@ TEST_F(GroundTruthTest, ReadsPairsAndPassesOverNames) {
   const std::string named = write("truth.csv", "Query, First, Last\n40,2,7\n");
   EXPECT_EQ(read_place_runs(named), (std::vector<PlaceRun>{{40, 2, 7}}));
   EXPECT_TRUE(read_place_runs(write("truth.csv", "# no revisit\n")).empty());
+  EXPECT_TRUE(read_place_runs(write("truth.csv", "query,match\n")).empty());
 }
 
 TEST_F(GroundTruthTest, ReadsWhatItWrote) {
   const std::vector<PlaceRun> runs{{40, 0, 2}, {40, 7, 7}, {1000000, 0, 999999}};
   write_place_runs(path("truth.csv"), "made by a test", runs);
   EXPECT_EQ(read_place_runs(path("truth.csv")), runs);
+  write_place_runs(path("truth.csv"), "made by a test", {});
+  EXPECT_TRUE(read_place_runs(path("truth.csv")).empty());
 }
 
 TEST_F(GroundTruthTest, ReadsFrameListsWithRemarks) {
@@ -48,6 +51,12 @@ TEST_F(GroundTruthTest, BadRowsNameFileAndLine) {
   }
   const std::string mixed = write("truth.csv", "query,match\n7,1\n7,1,2\n");
   test::expect_error(ErrorKind::input, {mixed, "line 3"}, [&] { read_place_runs(mixed); });
+  for (const char* words : {"hello world\n", "hello\n", "query,world\n"}) {
+    SCOPED_TRACE(words);
+    const std::string file = write("truth.csv", words);
+    test::expect_error(ErrorKind::input, {file, "line 1", "query,first,last"},
+                       [&] { read_place_runs(file); });
+  }
   const std::string list = write("ignore.csv", "wall\n");
   test::expect_error(ErrorKind::input, {list, "1", "wall"}, [&] { read_frame_list(list); });
 }

@@ -66,6 +66,55 @@ class MapCommandTest(CommandTest):
             ran = loopbit("eval", scored, "--truth", truth)
             self.assertEqual(ran.returncode, 0, ran.stderr)
 
+    def test_a_file_mounted_under_another_name_is_not_written(self):
+        town, alias = self.copy_of_map(), self.scratch / "alias.db"
+        alias.touch()
+        before = town.read_bytes()
+        # In a mount namespace of its own.
+        run = [LOOPBIT, "run", self.laps[0], "--map", alias, "--out", self.scratch / "out"]
+        script = ('mount --bind "$1" "$2" || exit 99\nshift 2\n"$@"')
+        ran = subprocess.run(["unshare", "-m", "sh", "-c", script, "sh", town, alias, *run],
+                             capture_output=True, text=True, stdin=subprocess.DEVNULL)
+        if ran.returncode == 99 or "unshare" in ran.stderr:
+            self.skipTest("bind mounts are not permitted here")
+        self.assert_fails(ran, 4, "alias.db", "is mounted as a single file", "mount its folder")
+        self.assertEqual(town.read_bytes(), before)
+
+    def test_a_header_that_forbids_writing_is_damage(self):
+        town = self.copy_of_map()
+        bytes_ = bytearray(town.read_bytes())
+        bytes_[18] = 3
+        town.write_bytes(bytes_)
+        checked = loopbit("map", "check", town)
+        self.assertEqual(checked.returncode, 3, checked.stdout)
+        self.assertIn("damaged    the file: its header gives", checked.stdout)
+        run = loopbit("run", self.laps[0], "--map", town, "--out", self.scratch / "out")
+        self.assert_fails(run, 3, "is damaged", "--recover")
+        self.assert_fails(loopbit("map", "merge", town, self.map), 3, "is damaged", "--recover")
+        new = self.scratch / "new.db"
+        self.assertEqual(loopbit("map", "check", town, "--recover", new).returncode, 0)
+        self.assertEqual(loopbit("map", "merge", new, self.map).returncode, 0)
+
+    def test_the_log_of_another_map_is_refused(self):
+        town = self.copy_of_map()
+        other = self.scratch / "other.db"
+        with subprocess.Popen([LOOPBIT, "run", self.laps[0], "--map", other, "--no-report"],
+                              stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
+            log = self.scratch / "other.db-wal"
+            while not log.exists() or log.stat().st_size < 100_000:
+                self.assertIsNone(killed.poll())
+                time.sleep(0.002)
+            killed.kill()
+        stray = pathlib.Path(shutil.copy(log, f"{town}-wal"))
+        before = town.read_bytes(), stray.read_bytes()
+        run = ("run", self.laps[0], "--map", town, "--out", self.scratch / "out")
+        for command in (run, ("map", "check", town), ("map", "info", town)):
+            self.assert_fails(loopbit(*command), 3, str(stray), "of another map")
+        self.assertEqual((town.read_bytes(), stray.read_bytes()), before)
+        stray.unlink()
+        self.assertEqual(loopbit("map", "check", town).returncode, 0)
+        self.assertEqual(loopbit("map", "check", other).returncode, 0)
+
     def test_neither_folder_nor_map_is_an_error(self):
         self.assert_fails(loopbit("run", self.laps[0]), 2, "--out", "--map")
 
@@ -306,7 +355,8 @@ class MapCommandTest(CommandTest):
     def test_merge_compact_and_check(self):
         merged = self.scratch / "merged.db"
         self.assertIn("2 sessions", loopbit("map", "merge", merged, self.map).stdout)
-        self.assertIn("2 sessions were there", loopbit("map", "merge", merged, self.map).stdout)
+        self.assertIn("2 sessions were already there",
+                      loopbit("map", "merge", merged, self.map).stdout)
         self.assertIn(f"{FRAMES} places", loopbit("map", "check", merged).stdout)
         self.assertIn(f"20 of {FRAMES} kept",
                       loopbit("map", "compact", merged, "--budget", 20).stdout)

@@ -16,7 +16,7 @@
 namespace loopbit::test {
 namespace {
 
-constexpr int kLap = 24;
+constexpr int kPlaces = 24;
 
 class MapSession : public ScratchTest {
  protected:
@@ -39,8 +39,8 @@ TEST_F(MapSession, AMapChangesNothingWithinASession) {
   LoopDetector with(fast_options(), map);
   LoopDetector without(fast_options());
   int loops = 0;
-  for (int frame = 0; frame < 2 * kLap; ++frame) {
-    const cv::Mat1b image = view(frame % kLap, {frame < kLap ? 0 : 5, 0});
+  for (int frame = 0; frame < 2 * kPlaces; ++frame) {
+    const cv::Mat1b image = view(frame % kPlaces, {frame < kPlaces ? 0 : 5, 0});
     const Detection a = with.process(image);
     const Detection b = without.process(image);
     EXPECT_EQ(a.frame, b.frame);
@@ -50,7 +50,7 @@ TEST_F(MapSession, AMapChangesNothingWithinASession) {
     EXPECT_FALSE(a.earlier_match.has_value());
     loops += a.status == Status::loop;
   }
-  EXPECT_GT(loops, kLap / 2);
+  EXPECT_GT(loops, kPlaces / 2);
 }
 
 TEST_F(MapSession, AVeryNarrowImageIsAPlaceAsAnyOther) {
@@ -66,8 +66,8 @@ TEST_F(MapSession, AVeryNarrowImageIsAPlaceAsAnyOther) {
 }
 
 TEST_F(MapSession, EarlierSessionsAreRecognisedFromTheFirstFrameOn) {
-  drive(0, kLap - 1);
-  const auto detections = drive(5, kLap - 1, {6, 2});
+  drive(0, kPlaces - 1);
+  const auto detections = drive(5, kPlaces - 1, {6, 2});
   for (const Detection& detection : detections) {
     EXPECT_EQ(detection.status, Status::loop) << detection.frame;
     ASSERT_TRUE(detection.earlier_match.has_value()) << detection.frame;
@@ -91,7 +91,7 @@ TEST_F(MapSession, TimesOfEarlierSessionsDoNotMatter) {
   for (int session = 1; session <= 2; ++session) {
     const auto map = std::make_shared<MapWriter>(path("map.db"), options, "drive");
     LoopDetector detector(options, map);
-    for (int place = 0; place < kLap; ++place) {
+    for (int place = 0; place < kPlaces; ++place) {
       const Detection detection = detector.process(view(place, {3, 0}), 5.0 + place);
       EXPECT_EQ(detection.status, session == 1 ? Status::no_earlier_place : Status::loop);
     }
@@ -99,8 +99,8 @@ TEST_F(MapSession, TimesOfEarlierSessionsDoNotMatter) {
 }
 
 TEST_F(MapSession, QueriesRankThePlacesOfAllSessions) {
-  drive(0, kLap - 1);
-  drive(0, kLap - 1, {8, 0});
+  drive(0, kPlaces - 1);
+  drive(0, kPlaces - 1, {8, 0});
   const auto map = std::make_shared<MapReader>(path("map.db"));
   LoopDetector detector(fast_options(), map);
   std::vector<RankedPlace> places;
@@ -113,14 +113,14 @@ TEST_F(MapSession, QueriesRankThePlacesOfAllSessions) {
   EXPECT_EQ(places[0].inliers, detection.inliers);
   EXPECT_EQ(detection.earlier_match, places[0].place);
   for (std::size_t i = 1; i < places.size(); ++i) EXPECT_GE(places[i - 1].score, places[i].score);
-  EXPECT_EQ(detector.query(view(kLap + 3)).status == Status::loop, false);
+  EXPECT_EQ(detector.query(view(kPlaces + 3)).status == Status::loop, false);
   expect_error(ErrorKind::option, {path("map.db"), "MapWriter"},
                [&] { detector.process(view(1)); });
 }
 
 TEST_F(MapSession, AQueryOfTheSameSessionIsSessionZero) {
   LoopDetector detector(fast_options());
-  for (int place = 0; place < kLap; ++place) detector.process(view(place));
+  for (int place = 0; place < kPlaces; ++place) detector.process(view(place));
   std::vector<RankedPlace> places;
   (void)detector.query(view(2, {4, 0}), std::nullopt, &places);
   ASSERT_FALSE(places.empty());
@@ -128,7 +128,7 @@ TEST_F(MapSession, AQueryOfTheSameSessionIsSessionZero) {
 }
 
 TEST_F(MapSession, PlacesWithoutTheirFeaturesAreNeverMatched) {
-  drive(0, kLap - 1);
+  drive(0, kPlaces - 1);
   change(path("map.db"), "DELETE FROM features WHERE place = 8");
   const auto map = std::make_shared<MapReader>(path("map.db"));
   const LoopDetector detector(map->options(), map);
@@ -156,7 +156,7 @@ TEST_F(MapSession, ADetectorOfOtherSettingsIsRefused) {
 }
 
 TEST_F(MapSession, AMapServesOneDetector) {
-  drive(0, kLap - 1);
+  drive(0, kPlaces - 1);
   const auto reader = std::make_shared<MapReader>(path("map.db"));
   const LoopDetector asked(fast_options(), reader);
   expect_error(ErrorKind::option, {"map.db", "has a detector"},
@@ -169,7 +169,7 @@ TEST_F(MapSession, AMapServesOneDetector) {
 }
 
 TEST_F(MapSession, FeaturesFoundLostDuringASessionAreTold) {
-  drive(0, kLap - 1);
+  drive(0, kPlaces - 1);
   change(path("map.db"), "UPDATE features SET checksum = 0 WHERE place = 8");
   const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
   LoopDetector detector(fast_options(), map);
@@ -206,8 +206,8 @@ TEST_F(MapSession, MatchesSupportEachOtherWithinASessionOnly) {
     }
     return drive(8, 16, {6, 2}, map);
   };
-  const auto one = last_session("one.db", {kLap});
-  const auto two = last_session("two.db", {12, kLap});
+  const auto one = last_session("one.db", {kPlaces});
+  const auto two = last_session("two.db", {12, kPlaces});
   // Frame 4 shows place 12, the first of the second session.
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(one[i].score, two[i].score);
   EXPECT_EQ(two[4].earlier_match, (SessionFrame{2, 0}));

@@ -372,6 +372,14 @@ TEST_F(OptionsFile, ThatCannotBeReadIsAnInputError) {
   expect_error(ErrorKind::input, {path("")}, [&] { load_options(path("")); });
 }
 
+TEST_F(OptionsFile, ThatIsNoTextOrTooLongIsAnInputError) {
+  expect_error(ErrorKind::input, {"/dev/zero", "device"}, [] { load_options("/dev/zero"); });
+  const std::string file = write("nul.json", std::string("{\"surf\": {}}\0", 13));
+  expect_error(ErrorKind::input, {file, "NUL"}, [&] { load_options(file); });
+  const std::string long_one = write("long.json", std::string((1U << 20U) + 1, ' '));
+  expect_error(ErrorKind::input, {long_one, "more than"}, [&] { load_options(long_one); });
+}
+
 TEST_F(OptionsFile, ThatIsEmptyIsBadSyntax) {
   const std::string file = write("empty.json", "");
   expect_error(ErrorKind::option, {file, "JSON"}, [&] { load_options(file); });

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/poses.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -17,13 +18,13 @@ namespace {
 using Poses = std::vector<std::optional<CameraPose>>;
 using Pairs = std::set<std::pair<int, int>>;
 
-constexpr double kDegree = CV_PI / 180;
+constexpr double kDeg = CV_PI / 180;
 
 CameraPose pose_at(double x, double z, double heading_deg = 0) {
-  return {{}, {x, 0, z}, {std::sin(heading_deg * kDegree), 0, std::cos(heading_deg * kDegree)}};
+  return {{}, {x, 0, z}, {std::sin(heading_deg * kDeg), 0, std::cos(heading_deg * kDeg)}};
 }
 
-Pairs pairs_of(const std::vector<PlaceRun>& runs) {
+Pairs expanded(const std::vector<PlaceRun>& runs) {
   Pairs pairs;
   for (const PlaceRun& run : runs) {
     for (int place = run.first; place <= run.last; ++place) {
@@ -58,7 +59,7 @@ Truth brute_force(const Poses& poses, const PoseTruthOptions& options) {
       const double cosine = std::clamp(poses[q]->ahead.dot(poses[p]->ahead), -1.0, 1.0);
       const bool same =
           distance_m <= options.radius_m && pair.first - pair.second > options.min_gap_frames &&
-          path_m >= options.min_path_m && std::acos(cosine) / kDegree <= options.max_heading_deg;
+          path_m >= options.min_path_m && std::acos(cosine) / kDeg <= options.max_heading_deg;
       if (same) truth.same.insert(pair);
       const bool grey = options.grey_radius_m > 0;
       if (grey && (same || distance_m <= options.grey_radius_m)) truth.near.insert(pair);
@@ -71,8 +72,8 @@ void expect_brute_force(const Poses& poses, const PoseTruthOptions& options) {
   const GroundTruth truth = truth_from_poses(poses, options);
   const Truth expected = brute_force(poses, options);
   EXPECT_FALSE(expected.same.empty()) << "this test shows nothing";
-  EXPECT_EQ(pairs_of(truth.same_place), expected.same);
-  EXPECT_EQ(pairs_of(truth.near_place), expected.near);
+  EXPECT_EQ(expanded(truth.same_place), expected.same);
+  EXPECT_EQ(expanded(truth.near_place), expected.near);
   EXPECT_EQ(truth.unknown, expected.unknown);
 }
 
@@ -105,6 +106,75 @@ TEST(TruthFromPoses, AgreesWithAllPairsOnRandomWalks) {
                                    .grey_radius_m = i % 4 * 2.0};
     expect_brute_force(random_walk(random, 400), options);
   }
+}
+
+PoseTruthOptions random_options(test::Random& random) {
+  return {.radius_m = 1.0 + 3 * random.uniform(),
+          .min_gap_frames = random.between(0, 60),
+          .min_path_m = random.between(0, 1) * 40.0 * random.uniform(),
+          .max_heading_deg = random.between(0, 1) == 0 ? 180.0 : 20.0 + 60 * random.uniform(),
+          .grey_radius_m = random.between(0, 2) * 4.0 * random.uniform()};
+}
+
+/// Laps of a circle with stops, each pose up to `noise_m` beside it; a few are missing.
+Poses laps_with_stops(test::Random& random, int frames, double noise_m) {
+  Poses poses;
+  double angle_deg = 0;
+  bool stands = false;
+  for (int i = 0; i < frames; ++i) {
+    if (random.between(0, 30) == 0) stands = !stands;
+    if (!stands) angle_deg += 10;
+    const double around = angle_deg * kDegree;
+    poses.emplace_back(pose_at(8 * std::cos(around), 8 * std::sin(around), angle_deg));
+    poses.back()->position_m += noise_m * cv::Vec3d(random.normal(), 0, random.normal());
+    if (random.between(0, 40) == 0) poses.back().reset();
+  }
+  return poses;
+}
+
+TEST(TruthFromPoses, AgreesWithAllPairsOnLapsWithStops) {
+  test::Random random(1);
+  for (int i = 0; i < 24; ++i) {
+    SCOPED_TRACE(i);
+    PoseTruthOptions options = random_options(random);
+    options.min_path_m = 0;  // where the robot stands most of the time
+    expect_brute_force(laps_with_stops(random, 300, i % 3 * 0.2), options);
+  }
+}
+
+TEST(TruthFromPoses, AgreesWithAllPairsWherePosesJump) {
+  test::Random random(2);
+  for (int i = 0; i < 8; ++i) {
+    SCOPED_TRACE(i);
+    Poses poses;
+    for (int k = 0; k < 300; ++k) {
+      poses.emplace_back(
+          pose_at(10 * random.uniform(), 10 * random.uniform(), 360 * random.uniform()));
+    }
+    expect_brute_force(poses, random_options(random));
+  }
+}
+
+TEST(TruthFromPoses, AStandingCameraIsOneRunAQuery) {
+  // Pair by pair this takes minutes.
+  constexpr int kFrames = 100'000;
+  const PoseTruthOptions options{.max_heading_deg = 90, .grey_radius_m = 6};
+  const GroundTruth still = truth_from_poses(Poses(kFrames, pose_at(1, 2, 30)), options);
+  EXPECT_EQ(still.same_place.size(), static_cast<std::size_t>(kFrames - 151));
+  EXPECT_EQ(still.same_place.back(), (PlaceRun{kFrames - 1, 0, kFrames - 152}));
+  EXPECT_EQ(still.near_place.back(), (PlaceRun{kFrames - 1, 0, kFrames - 2}));
+
+  test::Random random(3);
+  Poses trembling;
+  for (int i = 0; i < kFrames; ++i) {
+    trembling.emplace_back(pose_at(0.1 * random.normal(), 0.1 * random.normal(), random.normal()));
+  }
+  EXPECT_EQ(truth_from_poses(trembling, options).same_place, still.same_place);
+
+  // As far from the first half as the radius goes, to the last bit.
+  Poses two_places(kFrames, pose_at(0, 0));
+  std::fill(two_places.begin() + kFrames / 2, two_places.end(), pose_at(0, 6));
+  EXPECT_EQ(truth_from_poses(two_places).same_place.size(), still.same_place.size());
 }
 
 TEST(TruthFromPoses, ScalesWithPlacesFarFromTheOrigin) {

@@ -27,6 +27,12 @@ std::vector<std::string> lines_of(const std::string& path) {
   return lines;
 }
 
+RunRecord stopped_by(const std::string& reason) {
+  RunRecord record;
+  record.stopped_by = reason;
+  return record;
+}
+
 class RunFolderTest : public test::ScratchTest {};
 
 TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
@@ -191,8 +197,90 @@ TEST_F(RunFolderTest, AReplacedRunLeavesNothingBeside) {
     (void)write("run/evidence.db-wal", "old");
     folder.write_record({});
   }
-  const RunFolder replaced(path("run"), true);
-  EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 1);
+  RunFolder replaced(path("run"), true);
+  replaced.add({.frame = 0, .status = Status::unreadable});
+  replaced.write_record(stopped_by("end"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 2);
+}
+
+/// A run of `frames` unreadable frames that has ended, or as far as it came.
+void write_run(const std::string& folder, int frames, const std::string& reason = "end") {
+  RunFolder run(folder, true);
+  run.write_record(stopped_by(kRunning));
+  for (int frame = 0; frame < frames; ++frame) {
+    run.add({.frame = frame, .status = Status::unreadable});
+  }
+  if (reason != kRunning) run.write_record(stopped_by(reason));
+}
+
+std::size_t frames_in(const std::string& folder) { return read_run(folder).detections.size(); }
+
+TEST_F(RunFolderTest, ARunWithoutARowReplacesNothing) {
+  write_run(path("run"), 3);
+  const auto before = lines_of(path("run/run.json"));
+  for (const char* reason : {kRunning, "interrupt", "The disk is full."}) {
+    write_run(path("run"), 0, reason);
+    EXPECT_EQ(frames_in(path("run")), 3U);
+    EXPECT_EQ(lines_of(path("run/run.json")), before);
+    EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 2);
+  }
+}
+
+TEST_F(RunFolderTest, TheLastRunThatEndedIsKeptUntilAnotherEnds) {
+  write_run(path("run"), 3);
+  for (const int frames : {1, 2}) {
+    write_run(path("run"), frames, frames == 1 ? "The disk is full." : kRunning);
+    EXPECT_EQ(frames_in(path("run")), static_cast<std::size_t>(frames));
+    EXPECT_EQ(frames_in(path("run/earlier_run")), 3U);
+  }
+  const std::string own = path("run/earlier_run/loops.csv");
+  test::expect_error(ErrorKind::output, {own, "is read"},
+                     [&] { const RunFolder over(path("run"), true, {own}); });
+  write_run(path("run"), 4, "interrupt");
+  EXPECT_EQ(frames_in(path("run")), 4U);
+  EXPECT_FALSE(fs::exists(path("run/earlier_run")));
+}
+
+TEST_F(RunFolderTest, ARunThatEndedIsKeptThoughAnOlderOneIsStillThere) {
+  write_run(path("run/earlier_run"), 3);
+  write_run(path("other"), 4);
+  for (const char* name : {"loops.csv", "run.json"}) {
+    fs::copy(path("other/") + name, path("run/") + name);
+  }
+  write_run(path("run"), 1, kRunning);
+  EXPECT_EQ(frames_in(path("run/earlier_run")), 4U);
+}
+
+TEST_F(RunFolderTest, ARunThatACrashLeftHalfMovedIsMovedWhole) {
+  write_run(path("run"), 3);
+  fs::create_directory(path("run/earlier_run.part"));
+  fs::rename(path("run/run.json"), path("run/earlier_run.part/run.json"));
+  write_run(path("run"), 0, kRunning);
+  EXPECT_EQ(frames_in(path("run")), 3U);
+  EXPECT_TRUE(fs::exists(path("run/run.json")));
+  fs::create_directory(path("run/earlier_run.part"));
+  for (const char* name : {"loops.csv", "run.json"}) {
+    fs::rename(path("run/") + name, path("run/earlier_run.part/") + name);
+  }
+  test::expect_error(ErrorKind::output, {"earlier_run.part/loops.csv", "--overwrite"},
+                     [&] { const RunFolder unasked(path("run"), false); });
+  write_run(path("run"), 1, kRunning);
+  EXPECT_EQ(frames_in(path("run/earlier_run")), 3U);
+}
+
+TEST_F(RunFolderTest, HowARunEndsIsWrittenWhereNothingNewCanBe) {
+  RunFolder folder(path("run"), false);
+  folder.write_record(stopped_by(kRunning));
+  const auto size = fs::file_size(path("run/run.json"));
+  fs::create_directories(path("run/run.json.part/x"));  // in the way of any new file
+  folder.add({.frame = 0, .status = Status::unreadable});
+  folder.write_record(stopped_by("The disk is full."));
+  EXPECT_EQ(fs::file_size(path("run/run.json")), size);
+  const std::string record = read_run(path("run")).record_json;
+  EXPECT_NE(record.find("\"stopped_by\": \"The disk is full.\""), std::string::npos);
+  EXPECT_NE(record.find("\"counts\""), std::string::npos);
+  test::expect_error(ErrorKind::output, {"run.json"},
+                     [&] { folder.write_record(stopped_by(std::string(size, 'x'))); });
 }
 
 class EvidenceFileTest : public test::ScratchTest {

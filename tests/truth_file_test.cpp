@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 #include <matio.h>
 #include <opencv2/imgcodecs.hpp>
+#include <sys/stat.h>
 
 #include "test_support.hpp"
 
@@ -278,9 +279,9 @@ TEST_F(TruthFileTest, RefusesWhatIsNoMatrixOfRealNumbers) {
   expect_input_error(file, {"no square matrix", "m (3 x 3)"});
   TruthOptions options;
   options.variable = "m";
-  expect_input_error(file, {"'m'", "no matrix of real numbers"}, options);
+  expect_input_error(file, {"'m'", "not a matrix of real numbers"}, options);
   MatWriter(file).add_square<double>("m", {}, MAT_F_COMPLEX);
-  expect_input_error(file, {"'m'", "no matrix of real numbers"});
+  expect_input_error(file, {"'m'", "not a matrix of real numbers"});
   MatWriter(file).add<double>("m", {kSide, kSide}, dense<double>({kSide, {{4, 2}}}, kNan));
   expect_input_error(file, {"'m'", "row 5, column 3"});
   MatWriter(file).add_sparse("m", {kSide, {{4, 2}}}, kNan);
@@ -430,7 +431,9 @@ TEST_F(TruthFileTest, ReadsRuns) {
   EXPECT_EQ(read_truth(write("truth.csv", "query,first,last\n9,1,2\n")).same_place,
             (Runs{{9, 1, 2}}));
   EXPECT_EQ(read_truth(write("truth.csv", "9,1\n")).same_place, (Runs{{9, 1, 1}}));
-  EXPECT_TRUE(read_truth(write("truth.csv", "# no revisit\n")).same_place.empty());
+  EXPECT_TRUE(read_truth(write("truth.csv", "query,first,last\n")).same_place.empty());
+  write_place_runs(path("truth.csv"), "a drive without revisit", {});
+  EXPECT_TRUE(read_truth(path("truth.csv")).same_place.empty());
   expect_input_error(write("truth.csv", "9,1,2\n9,x,2\n"), {"line 2"});
 }
 
@@ -562,7 +565,6 @@ TEST_F(TruthFileTest, KindsAreTold) {
   EXPECT_EQ(truth_kind(write("truth.txt", "1.5 0 0 0 0 0 0 1\n")), TruthKind::poses);
   EXPECT_EQ(truth_kind(write("truth.csv", "query,match\n")), TruthKind::runs);
   EXPECT_EQ(truth_kind(write("truth.csv", "9,1,2\n")), TruthKind::runs);
-  EXPECT_EQ(truth_kind(write("truth.csv", "# no revisit\n")), TruthKind::runs);
   const std::string other = write("truth.csv", "1,2,3,4\n");
   test::expect_error(ErrorKind::input, {other, "line 1"}, [&] { truth_kind(other); });
 }
@@ -575,6 +577,71 @@ TEST_F(TruthFileTest, OtherTextIsRefused) {
     expect_input_error(write("truth.txt", text), {"line 1"});
   }
   expect_input_error(path("missing.txt"), {});
+}
+
+TEST_F(TruthFileTest, TruthWithoutAPlaceIsRefused) {
+  for (const char* text : {"", "\n", "# no revisit\n", "hello world\n"}) {
+    SCOPED_TRACE(text);
+    expect_input_error(write("truth.csv", text), {"query,first,last"});
+  }
+  const cv::Mat black = cv::Mat::zeros(20, 20, CV_8U);
+  cv::imwrite(path("mask.png"), black);
+  expect_input_error(path("mask.png"), {"no true place", "query,first,last"});
+}
+
+TEST_F(TruthFileTest, TruthOfFramesThatTheSequenceDoesNotHaveIsRefused) {
+  TruthOptions options;
+  options.poses.min_gap_frames = 1;
+  const std::string row = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  const std::string poses = write("poses.txt", row + row + row + row);
+  const std::string list = write("truth.csv", "3,0,1\n");
+  const auto expect_too_many = [&](const std::string& file, std::size_t frames,
+                                   std::initializer_list<std::string_view> parts) {
+    (void)read_truth(file, options, Times(frames));  // the run ended early
+    TruthOptions whole = options;
+    whole.all_read = true;
+    test::expect_error(ErrorKind::input, {file, "this sequence"},
+                       [&] { read_truth(file, whole, Times(frames)); });
+    test::expect_error(ErrorKind::input, parts, [&] { read_truth(file, whole, Times(frames)); });
+  };
+  expect_too_many(poses, 3, {"4 poses", "3 frames"});
+  expect_too_many(list, 3, {"frame 3", "3 frames"});
+  expect_too_many(mat({}), 4, {"13 frames", "4 frames"});
+  test::expect_error(ErrorKind::input, {poses, "4 poses", "3 frames"},
+                     [&] { check_poses(poses, 3, 1, true); });
+  options.every = 2;
+  expect_too_many(poses, 1, {"4 poses", "2 frames"});
+  options.all_read = true;
+  EXPECT_EQ(read_truth(poses, options, Times(2)).frames, 4);
+  EXPECT_EQ(read_truth(list, options, Times(2)).same_place.size(), 1U);
+  options.every = 3;
+  EXPECT_EQ(read_truth(poses, options, Times(2)).frames, 4) << "frames 0 and 3, and up to 5";
+  (void)read_truth(list, options);  // frames that are not known
+}
+
+TEST_F(TruthFileTest, ErrorsAboutPosesNameTheirFile) {
+  const std::string timed = write("trajectory.txt", "100 0 0 0 0 0 0 1\n");
+  test::expect_error(ErrorKind::input, {timed, "no frame is within"},
+                     [&] { read_truth(timed, {}, {0.5}); });
+  test::expect_error(ErrorKind::input, {timed, "no frame is within"},
+                     [&] { (void)read_positions(timed, {0.5}); });
+  const std::string far = write("poses.txt", "1 0 0 2e9 0 1 0 0 0 0 1 0\n");
+  test::expect_error(ErrorKind::input, {far, "frame 0"}, [&] { read_truth(far); });
+}
+
+TEST_F(TruthFileTest, OnlyRegularFilesOfTextAreRead) {
+  const std::string pipe = path("pipe.csv");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  test::expect_error(ErrorKind::input, {pipe, "pipe or a device"}, [&] { truth_kind(pipe); });
+  test::expect_error(ErrorKind::input, {pipe, "pipe or a device"}, [&] { read_place_runs(pipe); });
+  test::expect_error(ErrorKind::input, {"/dev/zero", "pipe or a device"},
+                     [] { truth_kind("/dev/zero"); });
+  test::expect_error(ErrorKind::input, {path(""), "is a folder"}, [&] { truth_kind(path("")); });
+  for (const std::string_view text :
+       {std::string_view("9,1,2\n9,\0,2\n", 12), std::string_view("# \0\n9,1,2\n", 10)}) {
+    const std::string line = text.front() == '#' ? "line 1" : "line 2";
+    expect_input_error(write("truth.csv", text), {"NUL", line, "UTF-8"});
+  }
 }
 
 TEST_F(TruthFileTest, TooFewRowsForTheSequenceAreNoticed) {

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Sphinx's settings; scripts/docs says where things are."""
+"""The settings of Sphinx; scripts/docs sets the paths."""
 
 import os
 import re
@@ -23,7 +23,7 @@ html_copy_source = False
 html_show_sourcelink = False
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
-# Nothing from elsewhere: the pages open without a network.
+# Load nothing external, so that the pages open without a network.
 html_theme_options = {"light_css_variables": {"font-stack": "system-ui, sans-serif"},
                       "dark_css_variables": {"font-stack": "system-ui, sans-serif"}}
 pygments_style = "friendly"

@@ -1,13 +1,13 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""The C++ reference as Markdown, from the XML that Doxygen makes of the public headers."""
+"""Writes the C++ reference as Markdown, from Doxygen's XML of the public headers."""
 
 import re
 import xml.etree.ElementTree as ElementTree
 
 
 def page(xml, headers):
-    """A section a header; `headers` are their names, in order."""
+    """One section per header; `headers` are their names, in order."""
     namespace = ElementTree.parse(xml / "namespaceloopbit.xml").getroot()
     members = list(namespace.iter("memberdef"))
     classes = [ElementTree.parse(xml / f"{inner.get('refid')}.xml").getroot().find("compounddef")
@@ -29,7 +29,7 @@ def header_of(definition):
 
 
 def is_for_users(compound):
-    """Not what is only declared, to be pointed to."""
+    """Excludes classes that are only forward declared."""
     return bool(prose(compound)) or compound.find("sectiondef") is not None
 
 
@@ -75,20 +75,20 @@ def code(member):
         member.find("initializer") is not None) else ""
     text = f"{kind} {member.findtext('name')}{member.findtext('argsstring') or ''} {initializer}"
     text = re.sub(r"\s+", " ", text).strip()
-    # As clang-format would have it.
+    # In the style of clang-format.
     text = re.sub(r" ?([&*]+) ?(?=\w+[,)=])", r"\1 ", text)
     text = re.sub(r"(?<=[<]) | (?=[>,])", "", text)
     return text.replace("|", r"\|") if member.get("kind") == "variable" else broken(text)
 
 
 def broken(text, width=80):
-    """A long declaration, with its parameters one a line."""
+    """A long declaration, with one parameter per line."""
     if len(text) <= width:
         return text
     result, depth = "", 0
     for c in text:
         depth += (c in "({") - (c in ")}")
-        # Within <> commas part other things.
+        # Commas within <> do not separate parameters.
         depth_of_template = result.count("<") - result.count(">") + result.count("->")
         result += c
         if depth == 1 and depth_of_template == 0 and c in "(,":
@@ -97,7 +97,7 @@ def broken(text, width=80):
 
 
 def prose(element):
-    """The description, with its marks escaped."""
+    """The description, with Markdown escaped."""
     found = [paragraphs(element.find(part))
              for part in ("briefdescription", "detaileddescription")
              if element.find(part) is not None]

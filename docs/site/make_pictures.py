@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Draws the documentation's pictures, with loopbit and its built-in world:
+"""Draws the pictures of the documentation from the built-in world:
 
     make_pictures.py FOLDER
 """
@@ -28,7 +28,7 @@ def save(figure, path):
 
 
 def panels(rows, columns):
-    """Small in inches, so that letters stay readable on a phone."""
+    """A small figure, so that letters stay readable on a phone."""
     figure, axes = pyplot.subplots(rows, columns, figsize=(5.0, 4.4 * rows / columns),
                                    layout="constrained")
     for each in axes.flat:
@@ -43,7 +43,7 @@ def show(axes, picture, title):
 
 
 def draw_content(world, folder):
-    """One image on its way to 512 bytes."""
+    """An image, its saliency map and its content."""
     image = world.render(200)
     content = loopbit.binary_content(image)
     figure, axes = panels(1, 3)
@@ -54,7 +54,7 @@ def draw_content(world, folder):
 
 
 def draw_candidates(world, run, query, folder):
-    """What retrieval answers for one frame."""
+    """The candidates of one frame."""
     contents = run.contents()
     index = loopbit.PlaceIndex()
     for frame in range(query - 60):
@@ -68,7 +68,7 @@ def draw_candidates(world, run, query, folder):
 
 
 def draw_inliers(world, detection, folder):
-    """The matches that one epipolar geometry explains."""
+    """The matches that fit one epipolar geometry."""
     pair = [world.render(frame) for frame in (detection.frame, detection.match)]
     query, place = map(loopbit.extract_surf, pair)
     inliers = loopbit.verify(query, place).inliers

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Visual loop closure detection: has the camera been at this place before? ::
+"""Visual loop closure detection: has the camera been at this place before?
+
+Process images one by one::
 
     import loopbit
 

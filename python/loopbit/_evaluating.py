@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Truth and scores: the rules of the command's --truth flags, for files and for values."""
+"""Ground truth and scores, with the rules of the command's --truth flags."""
 
 from __future__ import annotations
 
@@ -36,14 +36,16 @@ def read_truth(
     ignore: Path | None = None,
     every: int = 1,
     times_s: Times = (),
+    all_read: bool = False,
 ) -> GroundTruth:
-    """What is true about a sequence, by a file: rows of query,first,last or query,match; KITTI
-    poses, a TUM trajectory or EuRoC states, which need the frames' times; a loop matrix as .mat,
-    text or image.
+    """Reads a file of ground truth: rows of query,first,last or query,match; KITTI poses, a TUM
+    trajectory or EuRoC states; a loop matrix as .mat, text or image.
 
-    A protocol fixes poses and views, which then must not be given. not_false and ignore are files
-    of matches that are not wrong, and of queries that are not scored. All files count the frames of
-    the whole sequence, of which every so-many-th was read, at times_s.
+    poses, views and variable apply to poses and matrices; a protocol fixes poses and views.
+    not_false is a file of matches that are not wrong, ignore a file of queries that are not scored.
+    All files count the frames of the whole sequence; every means that only every N-th of them was
+    read. times_s has the times of the frames read, which trajectories with times need. all_read:
+    the sequence ends with those frames, so truth of more frames is refused.
     """
     kind = _loopbit.truth_kind(path)
     settings = PoseTruthOptions() if poses is None else poses
@@ -64,10 +66,10 @@ def read_truth(
     ):
         if given and kind != needed:
             raise _loopbit.OptionError(
-                f"{name} is about {_words(needed)}, but '{path}' is {_words(kind)}; leave it out, "
-                "or name another file."
+                f"{name} applies to {_words(needed)}, but '{path}' is {_words(kind)}; leave it "
+                "out, or give another file."
             )
-    truth = _loopbit._read_truth(path, settings, variable, rows, every, list(times_s))
+    truth = _loopbit._read_truth(path, settings, variable, rows, every, list(times_s), all_read)
     if not_false is None and ignore is None:
         return truth
     near = truth.near_place.tolist()
@@ -82,22 +84,22 @@ def read_truth(
 
 
 def check_kind(protocol: str, path: Path) -> None:
-    """Raises OptionError unless the protocol is defined on what the file is."""
+    """Raises OptionError if the protocol requires another kind of truth than the file has."""
     named, kind = _loopbit.find_protocol(protocol), _loopbit.truth_kind(path)
     if named.truth_kind != kind:
         raise _loopbit.OptionError(
-            f"protocol '{protocol}' is defined on {_words(named.truth_kind)}, but '{path}' "
-            f"is {_words(kind)}; name another file, or leave out the protocol."
+            f"protocol '{protocol}' requires {_words(named.truth_kind)}, but '{path}' "
+            f"is {_words(kind)}; give another file, or leave out the protocol."
         )
 
 
 def check_value(protocol: str) -> None:
-    """Raises OptionError if there is a protocol, for truth that does not say what it is by."""
+    """Raises OptionError if there is a protocol, because truth as a value has no known kind."""
     if protocol:
         kind = _loopbit.find_protocol(protocol).truth_kind
         raise _loopbit.OptionError(
-            f"protocol '{protocol}' is defined on {_words(kind)}, and this truth does not say that "
-            "it is by those; give truth as the path of a file, or leave out the protocol."
+            f"protocol '{protocol}' requires {_words(kind)}, but a GroundTruth has no known kind; "
+            "give truth as the path of a file, or leave out the protocol."
         )
 
 
@@ -116,12 +118,12 @@ def evaluate(
     protocol: str = "",
     tolerance_frames: int | None = None,
 ) -> Evaluation:
-    """Scores what a detector, any detector, found.
+    """Scores the loops of any detector.
 
-    found: a run, a list of matches, detections, or the path of a run folder or of a CSV of
-    query,match[,score]. truth: as read_truth() gives it, for the frames that were read, or its
-    path; a run that was given a truth needs none, and is scored as it was then. A protocol fixes
-    the tolerance, which then must not be given, and needs the truth's path.
+    found is a run, a MatchList, detections, or the path of a run folder or of a CSV file of
+    query,match[,score]. truth is a GroundTruth for the frames that were read, or the path of a
+    file. Without truth, a run is scored by the truth and the protocol that it was given. A protocol
+    fixes the tolerance and requires the path of a truth file.
     """
     if isinstance(found, (str, os.PathLike)) and os.path.isdir(found):
         found = _loopbit.read_run(found)
@@ -142,29 +144,39 @@ def evaluate(
     elif isinstance(truth, GroundTruth):
         check_value(protocol)
     if truth is None:
-        raise _loopbit.OptionError("Nothing says what is true; give truth.")
+        raise _loopbit.OptionError("There is no ground truth; give truth.")
     if tolerance < 0:
         raise _loopbit.OptionError(f"tolerance_frames is {tolerance}, but must be 0 or more.")
     matches = _matches(found)
     if not isinstance(truth, GroundTruth):
-        every = _every(found) if isinstance(found, FinishedRun) else 1
-        truth = read_truth(truth, protocol=protocol, every=every, times_s=matches.times_s)
+        every, is_whole = 1, False
+        if isinstance(found, FinishedRun):
+            every, is_whole = _every(found), _is_whole(found)
+        truth = read_truth(
+            truth, protocol=protocol, every=every, times_s=matches.times_s, all_read=is_whole
+        )
     return _loopbit._evaluate(matches, truth, tolerance, protocol)
 
 
 def recorded_scoring(run: FinishedRun) -> tuple[int, str]:
-    """The tolerance and the protocol that the run was scored with when it ended."""
+    """The tolerance and the protocol with which the run was scored at its end."""
     return _value_at(run, "score", "tolerance_frames", 0), _value_at(run, "score", "protocol", "")
 
 
 def _every(run: FinishedRun) -> int:
-    """Of the frames that files of truth count, every so-many-th was read."""
+    """The N of "every N-th frame was read", in frames of the truth file."""
     every, views = (max(1, _value_at(run, "input", name, 1)) for name in ("every", "views"))
     return max(1, every // views)
 
 
+def _is_whole(run: FinishedRun) -> bool:
+    """The sequence has no frame after those of the run."""
+    record = _record(run)
+    return record.get("stopped_by") == "end" and _value_at(run, "input", "limit", 1) == 0
+
+
 def _value_at(run: FinishedRun, part: str, name: str, otherwise: _Value) -> _Value:
-    """What stands there in run.json; `otherwise` where nothing of that type does."""
+    """A value of run.json; `otherwise` if it is missing or has another type."""
     found = _record(run).get(part)
     value = found.get(name) if isinstance(found, dict) else None
     return value if isinstance(value, type(otherwise)) else otherwise
@@ -177,7 +189,7 @@ def _record(run: FinishedRun) -> dict[str, Any]:
         record = None
     if not isinstance(record, dict):
         raise _loopbit.InputError(
-            f"The run.json in '{run.path}' is no record of a run: it was changed after loopbit "
+            f"The run.json in '{run.path}' is not a record of a run: it was changed after loopbit "
             "wrote it; run again."
         )
     return record

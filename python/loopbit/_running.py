@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Runs over whole sequences, and what they leave."""
+"""Runs over whole sequences, and their folders."""
 
 from __future__ import annotations
 
@@ -45,9 +45,11 @@ _DETECTION = numpy.dtype(
 
 
 def detections_array(detections: Iterable[Detection]) -> numpy.typing.NDArray[Any]:
-    """Detections as a structured array with the columns of loops.csv, where a match with an earlier
-    session of a map is two: earlier_session and earlier_frame. timestamp_s is nan, match and
-    earlier_frame are -1, and earlier_session is 0 where there is none."""
+    """Converts detections to a structured array with the columns of loops.csv.
+
+    A match with an earlier session of a map has two columns, earlier_session and earlier_frame.
+    Missing values are nan in timestamp_s, -1 in match and earlier_frame, 0 in earlier_session.
+    """
     rows = [
         (
             d.frame,
@@ -77,10 +79,10 @@ def run(
     on_detection: Callable[[Detection], None] | None = None,
     on_bad_frame: Callable[[str], None] = warnings.warn,
 ) -> list[Detection]:
-    """Detects frame by frame, to the end of a source or of what open_source() opens.
+    """Processes a source, or what open_source() opens, frame by frame to its end.
 
-    A frame that is unreadable, or of another size than the first, is told to on_bad_frame, counted
-    with the status unreadable, and the run goes on.
+    If a frame is unreadable or has another size than the first, on_bad_frame is called, the frame
+    gets the status unreadable, and the run continues.
     """
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)
@@ -90,13 +92,13 @@ def run(
 
 
 def _check_from_start(source: ImageSource, **files: object) -> None:
-    """Raises OptionError for a file, whose first row is the first frame, where that is gone."""
+    """Raises OptionError for a file that counts from the first frame if that was already read."""
     taken = _loopbit._frames_taken(source)
     for name, file in files.items():
         if taken and isinstance(file, (str, os.PathLike)):
             raise _loopbit.OptionError(
                 f"{name} is '{os.fspath(file)!s}', which counts from the first frame, but {taken} "
-                "frames of the source were taken before; open it anew."
+                "frames of the source were already read; open it again."
             )
 
 
@@ -114,35 +116,40 @@ def run_folder(
     evidence: bool = True,
     on_bad_frame: Callable[[str], None] = warnings.warn,
 ) -> FinishedRun:
-    """Runs a new detector and leaves a run folder, as the command 'loopbit run' does: loops.csv,
-    run.json, with evidence also what the frames looked like, for write_report().
+    """Runs a new detector and writes a run folder like 'loopbit run': loops.csv and run.json, and
+    with evidence also small images for write_report().
 
-    map: a map to continue with a session, made if there is none; places of earlier sessions are
-    recognised, too; keep_images: with a small JPEG of each place. Without out, the folder is beside
-    it: town_session_2 for session 2 of town.db. truth: a file's path, or as read_truth() gives it
-    for the frames that are read. positions_m: camera centres, one a frame read, nan where not
-    known, or a file of poses; a truth by poses gives them, too. Files count all frames of the
-    sequence, whatever part of it is read. A protocol needs the truth's path.
+    out: the folder. Without it, the folder is beside the map: town_session_2 for session 2 of
+    town.db.
+    map: a map that the run continues with a new session, or creates. Places of earlier sessions are
+    recognised.
+    keep_images: stores a small JPEG of each place in the map.
+    truth: the path of a file, or a GroundTruth for the frames that are read. A protocol requires
+    the path.
+    positions_m: camera centres, one per frame read, nan if unknown; or a file of poses. A truth
+    file of poses also provides them.
+    Files count all frames of the sequence, whatever part of it is read.
 
-    What is wrong with an argument is told before the first frame, where it can be. What turns out
-    to be wrong with truth or positions when the run has ended leaves it without them. An input none
-    of whose frames can be read is an InputError, and overwrite does not replace a run by it.
+    Arguments are checked before the first frame as far as possible. If truth or positions turn out
+    to be wrong after the run, the run is kept without them. An input without a readable frame is an
+    InputError, and does not replace an earlier run.
     """
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)
     every, frames = source.every, _loopbit._frames_left(source)
+    is_whole = frames is not None and _loopbit._limit(source) == 0
     _check_from_start(source, truth=truth, positions_m=positions_m)
     if keep_images and not map:
-        raise _loopbit.OptionError("keep_images keeps them in a map; give map, or leave it out.")
+        raise _loopbit.OptionError("keep_images stores images in a map; give map, or leave it out.")
     if not callable(on_bad_frame):
         raise TypeError(f"on_bad_frame is {on_bad_frame!r}, but must be callable.")
-    _check_truth(truth, protocol, every, frames)
+    _check_truth(truth, protocol, every, frames, is_whole)
     tolerance = _loopbit.find_protocol(protocol).tolerance_frames if protocol else 0
     if positions_m is None and isinstance(truth, (str, os.PathLike)):
         if _loopbit.truth_kind(truth) == TruthKind.poses:
             positions_m = truth
     if isinstance(positions_m, (str, os.PathLike)):
-        _loopbit._check_poses(positions_m, frames, every)
+        _loopbit._check_poses(positions_m, frames, every, False)
     elif positions_m is not None:
         positions_m = numpy.asarray(positions_m, dtype=float)
         _check_positions(positions_m, frames)
@@ -166,7 +173,10 @@ def run_folder(
         times_s = recorded.times_s
         try:
             if isinstance(truth, (str, os.PathLike)):
-                truth = read_truth(truth, protocol=protocol, every=every, times_s=times_s)
+                all_read = is_whole and len(times_s) == frames
+                truth = read_truth(
+                    truth, protocol=protocol, every=every, times_s=times_s, all_read=all_read
+                )
             if truth is not None:
                 recorded.score(truth, tolerance, protocol)
         finally:
@@ -181,13 +191,17 @@ def run_folder(
 
 
 def _check_truth(
-    truth: GroundTruth | Path | None, protocol: str, every: int, frames: int | None
+    truth: GroundTruth | Path | None,
+    protocol: str,
+    every: int,
+    frames: int | None,
+    is_whole: bool,
 ) -> None:
-    """Raises what reading truth will, as far as can be told before the frames are read."""
+    """Raises the errors of reading truth that can be found before the frames are read."""
     if truth is None:
         if protocol:
             raise _loopbit.OptionError(
-                f"protocol '{protocol}' is about truth; give truth, or leave out the protocol."
+                f"protocol '{protocol}' applies to truth; give truth, or leave out the protocol."
             )
     elif isinstance(truth, GroundTruth):
         check_value(protocol)
@@ -196,9 +210,10 @@ def _check_truth(
     elif _loopbit.truth_kind(truth) == TruthKind.poses:
         if protocol:
             check_kind(protocol, truth)
-        _loopbit._check_poses(truth, frames, every)
+        _loopbit._check_poses(truth, frames, every, is_whole)
     else:
-        read_truth(truth, protocol=protocol, every=every, times_s=[None] * (frames or 0))
+        times_s = [None] * (frames or 0)
+        read_truth(truth, protocol=protocol, every=every, times_s=times_s, all_read=is_whole)
 
 
 def _check_positions(positions_m: numpy.typing.NDArray[Any], frames: int | None) -> None:
@@ -207,17 +222,17 @@ def _check_positions(positions_m: numpy.typing.NDArray[Any], frames: int | None)
     if frames is not None and len(positions_m) != frames:
         raise ValueError(f"positions_m has {len(positions_m)} rows, but there are {frames} frames.")
     if numpy.isinf(positions_m).any():
-        raise ValueError("positions_m is infinite somewhere, but must be nan where not known.")
+        raise ValueError("positions_m is infinite somewhere, but must be nan if unknown.")
 
 
 def _plain(text: str) -> str:
-    """Without the bytes of file names that are no text."""
+    """Escapes bytes of file names that are not valid text."""
     return text.encode(errors="backslashreplace").decode()
 
 
 def write_report(run: FinishedRun | Path, path: Path | None = None) -> str:
-    """Writes the one HTML page of a run that 'loopbit report' writes; by default report.html in its
-    folder. Returns its path."""
+    """Writes the HTML page of a run like 'loopbit report', by default report.html in its folder.
+    Returns the path of the page."""
     if not isinstance(run, FinishedRun):
         run = _loopbit.read_run(run)
     path = os.path.join(run.path, "report.html") if path is None else os.fspath(path)

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Figures for papers, with matplotlib: vector graphics, told apart by shape and grey level alone.
+"""Figures for papers, with matplotlib. Lines and marks differ in shape and grey level.
 
 Each function draws into the given axes, or into a new figure, and returns the axes::
 
@@ -36,14 +36,15 @@ def _axes(axes: Axes | None) -> Axes:
 
 
 def trajectory(run: FinishedRun, axes: Axes | None = None) -> Axes:
-    """The path, in the two axes in which it is longest, and each loop as a line between its two
-    frames: right or not scored thin and grey, wrong thick and dashed; missed revisits as circles.
+    """Draws the trajectory in the two axes with the largest extent, and each loop as a line between
+    its two frames. Wrong loops are thick and dashed, others thin and grey; missed revisits are
+    circles.
 
     Raises ValueError if the run has no positions.
     """
     if len(run.positions_m) == 0:
         raise ValueError(f"The run '{run.path}' has no positions; give it positions_m.")
-    # Some have z up, others (KITTI) z ahead.
+    # Some data sets have z up, others (KITTI) z forward.
     spread = numpy.nanstd(run.positions_m, axis=0)
     at = run.positions_m[:, sorted(numpy.argsort(-spread)[:2])]
     axes = _axes(axes)
@@ -74,8 +75,8 @@ def _loops(run: FinishedRun) -> list[tuple[int, int]]:
 def precision_recall(
     evaluations: Evaluation | Mapping[str, Evaluation], axes: Axes | None = None
 ) -> Axes:
-    """The precision-recall curve of one evaluation, or of several by name; a dot stands where the
-    detector's own decision does."""
+    """Draws the precision-recall curve of one evaluation, or of several by name. A dot marks the
+    detector's own decision."""
     if isinstance(evaluations, Evaluation):
         evaluations = {"": evaluations}
     axes = _axes(axes)
@@ -98,8 +99,8 @@ def precision_recall(
 def times(
     detections: FinishedRun | Sequence[Detection], axes: Axes | None = None, *, bins: int = 100
 ) -> Axes:
-    """Milliseconds a frame by step, stacked; each bin is the mean of equally many frames. Those
-    that could not be read took none, and are left out."""
+    """Draws the time per frame by step, stacked. Each bin is the mean of the same number of frames.
+    Unreadable frames are left out."""
     if isinstance(detections, FinishedRun):
         detections = detections.detections
     table = detections_array([d for d in detections if d.status != Status.unreadable])
@@ -113,7 +114,7 @@ def times(
     for layer, hatch in zip(drawn, _HATCHES):
         layer.set_hatch(hatch)
     axes.set_xlabel("frame")
-    axes.set_ylabel("ms a frame")
+    axes.set_ylabel("ms per frame")
     axes.legend(frameon=False, fontsize="small", loc="upper left")
     return axes
 
@@ -122,9 +123,9 @@ def similarity(
     contents: FinishedRun | Sequence[BinaryContent] | numpy.typing.NDArray[Any],
     axes: Axes | None = None,
 ) -> Axes:
-    """The matrix of similarities xi, dark where alike: of a run's frames, with its loops as
-    circles, of contents, or as similarity_matrix() gives it. xi is the best over the shifts that
-    retrieval tolerates by default."""
+    """Draws the matrix of similarities xi; dark cells are similar. contents is a run, whose loops
+    are drawn as circles, a list of contents, or a matrix of similarity_matrix(). xi is the maximum
+    over the default shift tolerance of retrieval."""
     axes = _axes(axes)
     frames = None
     if isinstance(contents, FinishedRun):

@@ -104,19 +104,19 @@ py::array_t<double> similarity_matrix(const Contents& queries,
 
 void bind_content_type(py::module_& module) {
   py::class_<BinaryContent>(module, "BinaryContent",
-                            "The 64 x 64 bits an image is recognised by (512 bytes).")
+                            "The binary content of an image: 64 x 64 bits in 512 bytes.")
       .def(py::init(&content_of_rows), py::arg("rows"),
-           "From 64 words, uint64: row y is rows[y], column x its bit x.")
+           "From 64 words, uint64. Row y is rows[y], column x is its bit x.")
       .def_static("from_bits", &content_of_bits, py::arg("bits"),
-                  "From an array of shape (64, 64), true where a pixel is set.")
+                  "From an array of shape (64, 64). True sets a pixel.")
       .def_property_readonly(
           "rows",
           [](const py::object& self) -> Rows {
             const auto& content = self.cast<const BinaryContent&>();
             return view_of(content.rows.data(), {kContentSide}, self);
           },
-          "64 words, uint64, read-only, not copied.")
-      .def("bits", &bits_of, "The pixels, bool, shape (64, 64): y down, x right.")
+          "64 words, uint64, read-only and not copied.")
+      .def("bits", &bits_of, "The pixels, bool, shape (64, 64), y down, x right.")
       .def(
           "__eq__", [](const BinaryContent& a, const BinaryContent& b) { return a == b; },
           py::is_operator())
@@ -147,15 +147,16 @@ void bind_comparison(py::module_& module) {
       py::arg("content"),
       "M(O): the mean (x, y) of the set pixels, each in [0, 63]; (31.5, 31.5) if none is set.");
   module.def("shift_columns", &shift_columns, py::arg("content"), whole("columns"),
-             "The content moved so many columns to the right (left if negative).");
+             "The content shifted by columns to the right (left if negative).");
   module.def("similarity", &checked_similarity, py::arg("a"), py::arg("b"),
              whole("shift_tolerance_columns") = 0,
-             "xi(a, b) = |a & b| / max(|a|, |b|), in [0, 1], the largest over shifts of a by even "
-             "numbers of columns up to the tolerance, and by it; Wang et al. 2019, section III-B.");
+             "xi(a, b) = |a & b| / max(|a|, |b|), in [0, 1]: the maximum over shifts of a by even "
+             "numbers of columns up to the tolerance, and by the tolerance itself. Wang et al. "
+             "2019, section III-B.");
   module.def("similarity_matrix", &similarity_matrix, py::arg("queries"),
              py::arg("places") = py::none(), whole("shift_tolerance_columns") = 0,
-             "similarity() of every query (row) with every place (column), float64; without "
-             "places, of every two queries.");
+             "similarity() of every query (row) with every place (column), float64. Without "
+             "places, the queries are compared with each other.");
 }
 
 }  // namespace
@@ -177,7 +178,7 @@ void bind_content(py::module_& module) {
       },
       py::arg("image"), default_options,
       "The spectral residual saliency map, float32, shape (64, 64), not normalised; Hou and Zhang, "
-      "CVPR 2007. The image: uint8 or uint16, (h, w), or BGR or BGRA, at least 32 x 32.");
+      "CVPR 2007. The image is uint8 or uint16, (h, w), BGR or BGRA, at least 32 x 32.");
   module.def(
       "binary_content",
       [](ImageArgument image, const BinaryContentOptions& options) {
@@ -186,14 +187,15 @@ void bind_content(py::module_& module) {
         return binary_content(gray_image(pixels), options);
       },
       py::arg("image"), default_options,
-      "Step 1 of the method: the pixels whose saliency exceeds gamma times the mean. The image as "
-      "in saliency_map().");
+      "Step 1 of the method: sets the pixels whose saliency exceeds gamma times the mean. Accepts "
+      "the same images as saliency_map().");
   module.def(
       "_pixels_address",
       [](ImageArgument image) {
         return reinterpret_cast<std::uintptr_t>(to_image(image, "image").data);
       },
-      py::arg("image"), "Where the library reads an image: within the array, if it is not copied.");
+      py::arg("image"),
+      "The address at which the library reads an image. Within the array if it is not copied.");
   bind_comparison(module);
 }
 

@@ -32,15 +32,16 @@ using Times = std::vector<std::optional<double>>;
 using Positions = std::vector<std::optional<cv::Vec3d>>;
 using Free = py::call_guard<WithoutGil>;
 
-std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit) {
+std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit,
+                                          int max_megapixels) {
   if (every < 1 || limit < 0) {
     throw Error(ErrorKind::option,
                 fmt::format("every is {} and limit is {}, but every must be at least 1, and limit "
                             "0 (no limit) or more.",
                             every, limit));
   }
-  auto source = subsample(open_source(input.string()), static_cast<std::size_t>(every),
-                          static_cast<std::size_t>(limit));
+  auto source = subsample(open_source(input.string(), max_megapixels),
+                          static_cast<std::size_t>(every), static_cast<std::size_t>(limit));
   return std::make_unique<SharedSource>(std::move(source), input.string(), every, limit);
 }
 
@@ -53,16 +54,22 @@ Frame next_frame(SharedSource& source) {
   throw py::stop_iteration();
 }
 
+std::string early_end_of(const SharedSource& source) {
+  const WithoutGil release;
+  return source.early_end();
+}
+
 void bind_source(py::module_& module) {
   py::class_<Frame>(module, "Frame", "One image of a sequence, or the reason why there is none.")
       .def_property_readonly("name", text_of(&Frame::name),
-                             "Its name in its folder or list, or its position.")
-      .def_readonly("timestamp_s", &Frame::timestamp_s, "Seconds, where the data set has times.")
+                             "The name in its folder or list, or its position.")
+      .def_readonly("timestamp_s", &Frame::timestamp_s,
+                    "Time in seconds, or None if the data set has no times.")
       .def_property_readonly(
           "image", [](const Frame& self) { return to_array(self.image); },
-          "uint8 or uint16, (h, w), or BGR or BGRA; None if it is unreadable. Not copied.")
+          "uint8 or uint16, (h, w), BGR or BGRA; None if unreadable. Not copied.")
       .def_property_readonly("error", text_of(&Frame::error),
-                             "Empty, or why the image is unreadable.")
+                             "Why the image is unreadable; empty if it is readable.")
       .def("__repr__", [](const Frame& self) {
         return Text{fmt::format("Frame('{}', {})", self.name,
                                 self.image.empty()
@@ -74,23 +81,30 @@ void bind_source(py::module_& module) {
       .def("__iter__", [](SharedSource& self) -> SharedSource& { return self; })
       .def("__next__", &next_frame)
       .def("skip", &SharedSource::skip, Free(),
-           "Passes over the next frame without decoding it. False at the end.")
+           "Skips the next frame without decoding it. False at the end.")
       .def("size", &SharedSource::size,
-           "How many frames there are in all, where that is known; for a video an estimate.")
+           "The total number of frames, or None if unknown; an estimate for a video.")
       .def(
           "description", [](const SharedSource& self) { return Text{self.description()}; },
-          "One line that says what it is.")
-      .def_property_readonly("every", &SharedSource::every, "Every so many-th frame is read.")
+          "One line that describes the source.")
+      .def(
+          "early_end", [](const SharedSource& self) { return Text{early_end_of(self)}; },
+          "After the last frame: why the input ended early, such as a video that is cut off. Empty "
+          "if it did not.")
+      .def_property_readonly("every", &SharedSource::every, "Only every N-th frame is read.")
       .def("__repr__", [](const SharedSource& self) {
         return Text{fmt::format("ImageSource('{}')", self.description())};
       });
-  module.def("open_source", &open_shared, py::arg("input"), py::kw_only(), whole("every") = 1,
-             whole("limit") = 0, Free(),
-             "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
-             "folder, a text file that lists images, an image, a video, or 'camera:N'. Every so "
-             "many-th frame is read, at most so many (0: all).");
+  module.def(
+      "open_source", &open_shared, py::arg("input"), py::kw_only(), whole("every") = 1,
+      whole("limit") = 0, whole("max_megapixels") = kMaxMegapixels, Free(),
+      "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
+      "folder, a text file that lists images, an image, a video, or 'camera:N'. Reads only "
+      "every N-th frame, and at most limit frames (0 = all). Images above max_megapixels are "
+      "unreadable.");
   module.def("_frames_taken", &SharedSource::frames_taken, py::arg("source"), Free());
   module.def("_frames_left", &SharedSource::frames_left, py::arg("source"), Free());
+  module.def("_limit", &SharedSource::limit, py::arg("source"));
 }
 
 std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {
@@ -117,9 +131,9 @@ std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {
 
 void bind_truth(py::module_& module) {
   py::class_<GroundTruth>(module, "GroundTruth",
-                          "What is true about a sequence, in the numbers of all its frames: "
-                          "structured arrays of query, first and last, int32; the frames first to "
-                          "last show what frame query shows.")
+                          "The ground truth of a sequence, counted in all its frames. Structured "
+                          "arrays of query, first and last, int32: the frames first to last show "
+                          "the place of frame query.")
       .def(py::init([](const ArrayLike& same_place, const ArrayLike& near_place,
                        const ArrayLike& ignored, const ArrayLike& unknown, int every, int frames) {
              check_every(every);
@@ -135,26 +149,25 @@ void bind_truth(py::module_& module) {
            py::arg("same_place"), py::arg("near_place") = py::tuple(),
            py::arg("ignored") = py::tuple(), py::arg("unknown") = py::tuple(), whole("every") = 1,
            whole("frames") = 0,
-           "From integers of shape (n, 2): query, match; or (n, 3): query, first, last; places are "
-           "earlier frames.")
+           "From integers of shape (n, 2), query and match, or (n, 3), query, first and last. "
+           "Places are earlier than their query.")
       .def_property_readonly(
           "same_place", [](const GroundTruth& self) { return take(self.same_place); },
           "True earlier places.")
       .def_property_readonly(
           "near_place", [](const GroundTruth& self) { return take(self.near_place); },
-          "A match here is not false, nor right by this alone.")
+          "Matches that are not wrong; they are right only if same_place has them, too.")
       .def_property_readonly(
           "ignored", [](const GroundTruth& self) -> py::array_t<int> { return take(self.ignored); },
           "Queries that are not scored.")
       .def_property_readonly(
           "unknown", [](const GroundTruth& self) -> py::array_t<int> { return take(self.unknown); },
-          "Frames of which nobody knows what they show: not scored as queries, and no match with "
-          "them is false.")
+          "Frames of unknown places: not scored as queries, and never wrong as matches.")
       .def_readonly("every", &GroundTruth::every,
-                    "Of the sequence's frames every so-many-th was read: the k-th of them is frame "
-                    "k * every here.")
+                    "Only every N-th frame of the sequence was read. Frame k of the run is frame k "
+                    "* every here.")
       .def_readonly("frames", &GroundTruth::frames,
-                    "How many frames of the sequence are told of; 0 = not known.")
+                    "Number of frames that the truth covers; 0 = unknown.")
       .def("__repr__", [](const GroundTruth& self) {
         return fmt::format(
             "GroundTruth(same_place={} rows, near_place={} rows, ignored={}, unknown={}, every={}, "
@@ -162,10 +175,10 @@ void bind_truth(py::module_& module) {
             self.same_place.size(), self.near_place.size(), self.ignored.size(),
             self.unknown.size(), self.every, self.frames);
       });
-  py::enum_<TruthKind>(module, "TruthKind", "What a file says places are the same by.")
+  py::enum_<TruthKind>(module, "TruthKind", "The kind of a file of ground truth.")
       .value("runs", TruthKind::runs, "rows of query,first,last or query,match")
-      .value("matrix", TruthKind::matrix, "a cell for every two frames")
-      .value("poses", TruthKind::poses, "where the camera stood");
+      .value("matrix", TruthKind::matrix, "one cell per pair of frames")
+      .value("poses", TruthKind::poses, "camera poses");
 }
 
 /// To be called with the GIL, which is free meanwhile.
@@ -189,15 +202,15 @@ void bind_poses(py::module_& module) {
         return to_array(read_without_gil(path.string(), times_s, every));
       },
       py::arg("path"), py::arg("times_s"), whole("every") = 1,
-      "Camera centres by KITTI poses, a TUM trajectory or EuRoC states, shape (n, 3), nan where "
-      "not known: one for each time, None where a frame has none. Of the sequence's frames every "
-      "so-many-th was read, at these times.");
+      "Camera centres from KITTI poses, a TUM trajectory or EuRoC states: shape (n, 3), one row "
+      "per entry of times_s, nan if unknown. times_s has the times of the frames read, or None for "
+      "a frame without a time. every means that only every N-th frame of the sequence was read.");
   module.def(
       "_check_poses",
-      [](const Path& path, std::optional<std::size_t> frames, int every) {
-        check_poses(path.string(), frames, every);
+      [](const Path& path, std::optional<std::size_t> frames, int every, bool all_read) {
+        check_poses(path.string(), frames, every, all_read);
       },
-      py::arg("path"), whole("frames"), whole("every"), Free());
+      py::arg("path"), whole("frames"), whole("every"), py::arg("all_read"), Free());
 }
 
 }  // namespace
@@ -213,11 +226,11 @@ void bind_data(py::module_& module) {
   module.def(
       "_read_truth",
       [](const Path& path, const PoseTruthOptions& poses, const std::string& variable, int views,
-         int every, const Times& times_s) {
-        return read_truth(path.string(), {poses, variable, views, every}, times_s);
+         int every, const Times& times_s, bool all_read) {
+        return read_truth(path.string(), {poses, variable, views, every, all_read}, times_s);
       },
       py::arg("path"), py::arg("poses"), py::arg("variable"), whole("views"), whole("every"),
-      py::arg("times_s"), Free());
+      py::arg("times_s"), py::arg("all_read"), Free());
   module.def(
       "_read_place_runs", [](const Path& path) { return take(place_runs_of(path.string())); },
       py::arg("path"));
@@ -225,7 +238,7 @@ void bind_data(py::module_& module) {
       "_read_frame_list", [](const Path& path) { return read_frame_list(path.string()); },
       py::arg("path"), Free());
   module.def("every_nth", &every_nth, py::arg("truth"), whole("every"), Free(),
-             "What the truth says where only every so many-th frame was read.");
+             "The ground truth of every N-th frame, numbered by the frames that were read.");
 }
 
 }  // namespace loopbit::python

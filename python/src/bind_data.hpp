@@ -51,6 +51,10 @@ class SharedSource : public ImageSource {
 
   [[nodiscard]] std::optional<std::size_t> size() const override { return source_.size(); }
   [[nodiscard]] std::string description() const override { return source_.description(); }
+  [[nodiscard]] std::string early_end() const override {
+    const std::scoped_lock lock(mutex_);
+    return source_.early_end();
+  }
   [[nodiscard]] const std::string& input() const { return input_; }
   [[nodiscard]] int every() const { return every_; }
   [[nodiscard]] int limit() const { return limit_; }
@@ -64,7 +68,7 @@ class SharedSource : public ImageSource {
   std::string input_;
   int every_;
   int limit_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::size_t taken_ = 0;
   ProvableSource source_;
 };

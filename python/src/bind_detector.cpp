@@ -41,7 +41,7 @@ namespace {
 
 namespace py = pybind11;
 
-/// Takes the lock of a detector while the GIL is free.
+/// Releases the GIL and locks a detector.
 struct FreeAndLocked {
   explicit FreeAndLocked(std::recursive_mutex& mutex) : lock(mutex) {}
 
@@ -69,11 +69,12 @@ std::string detection_text(const Detection& d) {
 }
 
 void bind_detection(py::module_& module) {
-  py::enum_<Status> status(module, "Status", "Why a frame is a loop, or why not.");
+  py::enum_<Status> status(module, "Status",
+                           "The decision for a frame, with one value per reason of rejection.");
   for (const Status each : kAllStatuses) status.value(to_string(each).data(), each);
   py::class_<StepTimes>(module, "StepTimes", "Wall time of the steps of one detection.")
       .def_readonly("content_ms", &StepTimes::content_ms,
-                    "Binary content, with conversion to grey.")
+                    "Binary content, including the conversion to grey.")
       .def_readonly("retrieval_ms", &StepTimes::retrieval_ms, "Fast image retrieval.")
       .def_readonly("features_ms", &StepTimes::features_ms, "SURF.")
       .def_readonly("verification_ms", &StepTimes::verification_ms,
@@ -85,18 +86,21 @@ void bind_detection(py::module_& module) {
             t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
       });
   py::class_<Detection>(module, "Detection",
-                        "The answer for one frame, with the numbers behind it.")
-      .def_readonly("frame", &Detection::frame, "The frame's number, from 0.")
-      .def_readonly("timestamp_s", &Detection::timestamp_s, "As it was given.")
-      .def_readonly("status", &Detection::status, "Why it is a loop, or why not.")
-      .def_readonly("match", &Detection::match,
-                    "The best candidate, accepted or not, or None; a frame of this session.")
-      .def_readonly("earlier_match", &Detection::earlier_match,
-                    "The same, where it is a frame of an earlier session of the map.")
-      .def_readonly("score", &Detection::score, "What was compared with decision.min_score.")
+                        "The result for one frame, with the numbers behind the decision.")
+      .def_readonly("frame", &Detection::frame, "Number of the frame, from 0.")
+      .def_readonly("timestamp_s", &Detection::timestamp_s, "The time passed to process().")
+      .def_readonly("status", &Detection::status, "The decision, or the reason of rejection.")
+      .def_readonly(
+          "match", &Detection::match,
+          "The best candidate, accepted or not, if it is a frame of this session; else None.")
+      .def_readonly(
+          "earlier_match", &Detection::earlier_match,
+          "The best candidate if it is a frame of an earlier session of the map; else None.")
+      .def_readonly("score", &Detection::score, "The value compared with decision.min_score.")
       .def_readonly("similarity", &Detection::similarity, "xi of frame and match.")
-      .def_readonly("matches", &Detection::matches, "Features shared, one to one.")
-      .def_readonly("inliers", &Detection::inliers, "Those that one epipolar geometry explains.")
+      .def_readonly("matches", &Detection::matches, "Number of one-to-one feature matches.")
+      .def_readonly("inliers", &Detection::inliers,
+                    "Number of matches that fit one epipolar geometry.")
       .def_readonly("times", &Detection::times, "The time of each step.")
       .def_property_readonly(
           "is_loop", [](const Detection& self) { return self.status == Status::loop; },
@@ -106,8 +110,9 @@ void bind_detection(py::module_& module) {
 
 void bind_ranked_place(py::module_& module) {
   py::class_<RankedPlace>(module, "RankedPlace",
-                          "A place that an image may show, with the numbers behind it.")
-      .def_readonly("place", &RankedPlace::place, "Session 0 is the detector's own.")
+                          "A candidate of a query, with the numbers behind its rank.")
+      .def_readonly("place", &RankedPlace::place,
+                    "Session and frame; session 0 is the detector's own.")
       .def_readonly("score", &RankedPlace::score)
       .def_readonly("similarity", &RankedPlace::similarity)
       .def_readonly("matches", &RankedPlace::matches)
@@ -119,7 +124,7 @@ void bind_ranked_place(py::module_& module) {
       });
 }
 
-/// SharedDetector::query, and where a list is given, its new contents.
+/// SharedDetector::query; fills the list if one is given.
 Detection query(const SharedDetector& detector, ImageArgument image,
                 std::optional<double> timestamp_s, std::optional<Ranking> ranking) {
   if (!ranking) return detector.query(std::move(image), timestamp_s, nullptr);
@@ -138,7 +143,7 @@ struct PointPairRow {
 void bind_evidence(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(PointPairRow, query_x, query_y, match_x, match_y);
   py::class_<Evidence>(module, "Evidence",
-                       "What a detection rests on, for people to look at; process() fills it.")
+                       "The evidence of a detection, for display. process() fills it.")
       .def(py::init<>())
       .def_readonly("content", &Evidence::content, "The frame's binary content.")
       .def_property_readonly(
@@ -176,7 +181,7 @@ Detection SharedDetector::process(ImageArgument image, std::optional<double> tim
     const FreeAndLocked guard(mutex_);
     detection = detector_.process(pixels, timestamp_s, evidence ? &seen : nullptr);
   }
-  // With the GIL, for others may be reading it.
+  // With the GIL, because other threads may read it.
   if (evidence) *evidence = std::move(seen);
   return detection;
 }
@@ -209,30 +214,29 @@ void bind_detector(py::module_& module) {
   bind_evidence(module);
   py::class_<SharedDetector>(
       module, "LoopDetector",
-      "Tells for each camera image whether the camera has been at this place before. Several "
-      "threads may share one; it works for one at a time, without the GIL.")
+      "Detects for each camera image whether the camera has been at this place before. Threads may "
+      "share a detector; it serves one at a time, and releases the GIL.")
       .def(py::init<const std::optional<LoopDetectorOptions>&, const std::shared_ptr<SharedMap>&>(),
            py::arg("options") = py::none(), py::arg("map") = py::none(),
            py::call_guard<WithoutGil>(),
-           "Without options, those of the map, or the defaults. With a map, all places of its "
-           "sessions are candidates, whatever the exclusion window; a MapWriter is continued with "
-           "what is processed, a MapReader only asked. A map serves one detector. Raises "
+           "Without options, uses those of the map, or the defaults. With a map, all places of its "
+           "sessions are candidates, whatever the exclusion window. A MapWriter also stores the "
+           "processed frames; a MapReader is only queried. A map serves one detector. Raises "
            "OptionError if the map was made with other settings of binary_content or surf.")
       .def("process", &SharedDetector::process, py::arg("image"),
            py::arg("timestamp_s") = py::none(), py::arg("evidence") = py::none(),
-           "Detects, then adds the image as the next place. The image: uint8 or uint16, (h, w), or "
-           "BGR or BGRA, at least 32 x 32; not copied where its rows are contiguous. The time: not "
-           "before the last one. The evidence, if given, is filled.")
-      .def(
-          "query", &query, py::arg("image"), py::arg("timestamp_s") = py::none(),
-          py::arg("ranking") = py::none(),
-          "What process() would answer now, without adding anything. The ranking, if given, is "
-          "filled with all candidates, best first, at the cost of verifying each of them; only the "
-          "first can be a loop.")
+           "Detects a loop, then adds the image as the next place. The image is uint8 or uint16, "
+           "(h, w), BGR or BGRA, at least 32 x 32; it is not copied if its rows are contiguous. "
+           "timestamp_s must not go back. If evidence is given, it is filled.")
+      .def("query", &query, py::arg("image"), py::arg("timestamp_s") = py::none(),
+           py::arg("ranking") = py::none(),
+           "Returns what process() would return, without adding the image. If ranking is given, it "
+           "is filled with all candidates, best first, and every candidate is verified, which "
+           "takes longer. Only the first can be a loop.")
       .def("skip", &SharedDetector::skip, py::arg("timestamp_s") = py::none(),
-           "Counts a frame without a usable image, so that numbers keep step with the camera.")
+           "Counts a frame without a usable image, so that frame numbers stay aligned.")
       .def("__len__", &SharedDetector::size)
-      .def_property_readonly("options", &SharedDetector::options, "A copy of its settings.")
+      .def_property_readonly("options", &SharedDetector::options, "A copy of the settings.")
       .def("__repr__", [](const SharedDetector& self) {
         return fmt::format("LoopDetector({} frames)", self.size());
       });

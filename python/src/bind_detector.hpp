@@ -14,12 +14,12 @@
 
 namespace loopbit::python {
 
-/// A LoopDetector that several Python threads may hold: one at a time uses it, and the GIL is free
-/// meanwhile.
+/// A LoopDetector that several Python threads may share. It serves one at a time and releases the
+/// GIL.
 class SharedDetector {
  public:
-  /// Without options, those of the map, or the defaults. Throws Error (kind option) if the map was
-  /// made with others of binary_content or surf. To be called without the GIL.
+  /// Without options, uses those of the map, or the defaults. Throws Error (kind option) if the map
+  /// was made with other settings of binary_content or surf. Call it without the GIL.
   SharedDetector(const std::optional<LoopDetectorOptions>& options,
                  const std::shared_ptr<SharedMap>& map);
 
@@ -30,8 +30,8 @@ class SharedDetector {
   [[nodiscard]] PlaceId size() const;
   [[nodiscard]] LoopDetectorOptions options() const;
 
-  /// Calls use(detector) while nobody else may. The GIL must not be held: who waits for it while
-  /// another waits for the detector would wait forever.
+  /// Calls use(detector) exclusively. Do not hold the GIL: two threads that wait for the GIL and
+  /// for the detector would deadlock.
   template <typename Use>
   void exclusively(Use&& use) {
     const std::scoped_lock lock(mutex_);
@@ -39,7 +39,7 @@ class SharedDetector {
   }
 
  private:
-  /// A callback in the midst of a run may ask the detector that runs.
+  /// Recursive, because a callback during a run may query the detector.
   mutable std::recursive_mutex mutex_;
   LoopDetector detector_;
 };

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "loopbit/error.hpp"
+#include "loopbit/printable.hpp"
 
 #include "bindings.hpp"
 #include "text.hpp"
@@ -14,8 +15,8 @@ namespace {
 
 namespace py = pybind11;
 
-// One for each ErrorKind. They live as long as the process: the interpreter may raise them until
-// its very end.
+// One type per ErrorKind. They live as long as the process, because the interpreter may raise them
+// until it ends.
 struct ErrorTypes {
   PyObject* option = nullptr;
   PyObject* input = nullptr;
@@ -51,22 +52,22 @@ PyObject* type_of(ErrorKind kind) {
 }  // namespace
 
 void bind_errors(py::module_& module) {
-  const py::handle base =
-      add_error(module, "Error", py::make_tuple(py::handle(PyExc_Exception)),
-                "What loopbit raises on purpose: one sentence that names the thing, its value and "
-                "the remedy.");
+  const py::handle base = add_error(
+      module, "Error", py::make_tuple(py::handle(PyExc_Exception)),
+      "The base of all errors that loopbit raises. The message names the thing, its value and the "
+      "remedy.");
   error_types() = {
       add_error(module, "OptionError", py::make_tuple(base, py::handle(PyExc_ValueError)),
-                "An option or argument has a bad value."),
+                "An option or argument has an invalid value."),
       add_error(module, "InputError", py::make_tuple(base, py::handle(PyExc_ValueError)),
-                "Something to be read is missing, damaged or of the wrong kind."),
+                "An input is missing, damaged or of the wrong kind."),
       add_error(module, "OutputError", py::make_tuple(base, py::handle(PyExc_OSError)),
-                "Something could not be written.")};
+                "An output could not be written.")};
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(std::move(thrown));
     } catch (const Error& error) {
-      PyErr_SetObject(type_of(error.kind()), py::cast(Text{error.what()}).ptr());
+      PyErr_SetObject(type_of(error.kind()), py::cast(Text{printable(error.what())}).ptr());
     }
   });
 }

@@ -22,7 +22,7 @@ namespace {
 
 namespace py = pybind11;
 
-/// Throws ValueError unless a column has one value a row.
+/// Throws ValueError unless a column has one value per row.
 void check_rows(std::size_t values, std::size_t rows, const char* name) {
   if (values == rows) return;
   throw py::value_error(
@@ -55,22 +55,21 @@ MatchList list_of(const ArrayLike& query, const ArrayLike& match,
 }
 
 void bind_matches(py::module_& module) {
-  py::class_<MatchList>(module, "MatchList",
-                        "What a detector, any detector, says about a sequence.")
+  py::class_<MatchList>(module, "MatchList", "The matches of any detector on a sequence.")
       .def(py::init(&list_of), py::arg("query"), py::arg("match"), py::arg("score") = py::none(),
            py::arg("is_loop") = py::none(),
-           "One value a match: a frame and an earlier one, how sure (1 if not given), and whether "
-           "the detector accepts it (true if not given).")
+           "One value per match: a frame, an earlier frame, the score (default 1), and whether the "
+           "detector accepts the match (default true).")
       .def_property_readonly(
           "matches", [](const MatchList& self) { return take(self.matches); },
           "Structured array of query, match, score and is_loop.")
       .def_property_readonly(
           "times_s", [](const MatchList& self) { return self.times_s; },
-          "Seconds or None, one a frame; empty where frames are not listed.")
+          "Seconds or None, one per frame; empty if frames are not listed.")
       .def_property_readonly(
           "elsewhere",
           [](const MatchList& self) -> py::array_t<int> { return take(self.elsewhere); },
-          "Queries whose accepted match is in another recording, and which are not scored.")
+          "Queries whose accepted match is in another recording; they are not scored.")
       .def("__len__", [](const MatchList& self) { return self.matches.size(); })
       .def("__repr__", [](const MatchList& self) {
         return fmt::format("MatchList({} matches)", self.matches.size());
@@ -79,7 +78,7 @@ void bind_matches(py::module_& module) {
       "read_match_list",
       [](const std::filesystem::path& path) { return read_match_list(path.string()); },
       py::arg("path"), py::call_guard<WithoutGil>(),
-      "Reads a loops.csv, or any CSV of query,match[,score].");
+      "Reads a loops.csv, or any CSV file of query,match[,score].");
 }
 
 template <typename Counts>
@@ -95,35 +94,38 @@ void bind_shares(py::class_<Counts>& type, const char* recall) {
 
 void bind_counts(py::module_& module) {
   py::class_<DecisionCounts> decision(module, "DecisionCounts",
-                                      "What the decisions of a detector come to, query by query.");
+                                      "Counts of a detector's decisions, per query.");
   decision
       .def_readonly("positives", &DecisionCounts::positives,
-                    "Queries that are scored and have a true earlier place.")
+                    "Scored queries with a true earlier place.")
       .def_readonly("right", &DecisionCounts::right)
       .def_readonly("tolerated", &DecisionCounts::tolerated)
       .def_readonly("wrong", &DecisionCounts::wrong)
-      .def_readonly("ignored", &DecisionCounts::ignored, "Queries left out of the score.");
+      .def_readonly("ignored", &DecisionCounts::ignored, "Queries that are not scored.");
   bind_shares(decision, "right / positives; 0 without positives.");
-  py::class_<PairCounts> pairs(module, "PairCounts", "What they come to pair by pair.");
+  py::class_<PairCounts> pairs(module, "PairCounts",
+                               "Counts of a detector's decisions, per pair of frames.");
   pairs.def_readonly("positives", &PairCounts::positives, "All true pairs of frames.")
-      .def_readonly("found", &PairCounts::found, "Of those the accepted ones.")
+      .def_readonly("found", &PairCounts::found, "True pairs that were accepted.")
       .def_readonly("right", &PairCounts::right,
-                    "Accepted ones that are true or within the tolerance of a true one.")
+                    "Accepted pairs that are true or within the tolerance of a true pair.")
       .def_readonly("wrong", &PairCounts::wrong);
   bind_shares(pairs, "found / positives; 0 without positives.");
 }
 
 void bind_result(py::module_& module) {
-  py::class_<Evaluation>(module, "Evaluation", "How good a detector's matches are.")
-      .def_readonly("decision", &Evaluation::decision, "Query by query, as decided.")
-      .def_readonly("pairs", &Evaluation::pairs, "Pair by pair, as decided.")
+  py::class_<Evaluation>(module, "Evaluation", "The score of a detector's matches.")
+      .def_readonly("decision", &Evaluation::decision,
+                    "Counts per query, with the detector's own decisions.")
+      .def_readonly("pairs", &Evaluation::pairs,
+                    "Counts per pair, with the detector's own decisions.")
       .def_property_readonly(
           "curve", [](const Evaluation& self) { return take(self.curve); },
           "The precision-recall curve: structured array of score, right, wrong, precision and "
-          "recall, a row for each score that occurs, from the highest.")
+          "recall, one row per distinct score, from the highest.")
       .def_readonly("recall_at_full_precision", &Evaluation::recall_at_full_precision)
       .def_readonly("score_at_full_precision", &Evaluation::score_at_full_precision,
-                    "The lowest score with no wrong match at it or above, or None.")
+                    "The lowest score with no wrong match at or above it, or None.")
       .def_readonly("average_precision", &Evaluation::average_precision)
       .def_property_readonly(
           "wrong_loops", [](const Evaluation& self) { return take(self.wrong_loops); },
@@ -133,17 +135,16 @@ void bind_result(py::module_& module) {
           "Revisits without a right loop.")
       .def_property_readonly(
           "protocol", [](const Evaluation& self) { return self.options.protocol; },
-          "Its name; empty if it has none.")
+          "The name of the protocol, or empty.")
       .def_property_readonly("tolerance_frames",
                              [](const Evaluation& self) { return self.options.tolerance_frames; })
       .def(
           "to_json", [](const Evaluation& self, bool full) { return to_json(self, full); },
-          py::arg("full") = true, "As loopbit eval --json prints it; full adds the lists.")
+          py::arg("full") = true, "The JSON of loopbit eval --json; full adds the lists.")
       .def("__repr__", [](const Evaluation& self) {
         return fmt::format(
             "Evaluation(recall={:.4f}, precision={:.4f}, wrong={}, "
-            "recall_at_full_precision={:.4f}, "
-            "average_precision={:.4f})",
+            "recall_at_full_precision={:.4f}, average_precision={:.4f})",
             self.decision.recall(), self.decision.precision(), self.decision.wrong,
             self.recall_at_full_precision, self.average_precision);
       });
@@ -151,25 +152,26 @@ void bind_result(py::module_& module) {
 
 void bind_protocols(py::module_& module) {
   py::class_<Protocol>(module, "Protocol",
-                       "A published way of scoring: its name fixes all settings.")
+                       "A published scoring protocol. Its name fixes all settings.")
       .def_property_readonly("name", [](const Protocol& self) { return std::string(self.name); })
       .def_property_readonly(
           "help", [](const Protocol& self) { return std::string(self.help); }, "One line.")
-      .def_readonly("truth_kind", &Protocol::truth_kind, "What it is defined on.")
+      .def_readonly("truth_kind", &Protocol::truth_kind, "The kind of truth that it requires.")
       .def_readonly("tolerance_frames", &Protocol::tolerance_frames)
       .def_property_readonly(
           "poses", [](const Protocol& self) { return self.truth.poses; },
-          "When two poses show the same place.")
+          "The rule by which two poses show the same place.")
       .def_property_readonly(
           "views", [](const Protocol& self) { return self.truth.views; },
-          "Rows a frame has in a loop matrix.")
+          "Rows per frame in a loop matrix.")
       .def("__repr__", [](const Protocol& self) {
         return fmt::format("Protocol('{}': {})", self.name, self.help);
       });
   module.def(
       "protocols", [] { return std::vector<Protocol>(protocols().begin(), protocols().end()); },
-      "All published ways of scoring that are known by name.");
-  module.def("find_protocol", &find_protocol, py::arg("name"), "The one of that name.");
+      "All known protocols.");
+  module.def("find_protocol", &find_protocol, py::arg("name"),
+             "The protocol with this name. Raises OptionError if there is none.");
 }
 
 }  // namespace

@@ -28,10 +28,10 @@ void bind_feature_types(py::module_& module) {
           [](const Features& self) {
             return std::pair(self.working_size_px.width, self.working_size_px.height);
           },
-          "(width, height) of the image that the features were sought in, pixels.")
+          "(width, height) of the working image, pixels.")
       .def_property_readonly(
           "num_dark", [](const Features& self) { return self.num_dark; },
-          "The first so many are dark blobs, the rest bright ones; each strongest first.")
+          "Number of dark blobs, which come first. Both groups are sorted by strength.")
       .def_property_readonly(
           "keypoints",
           [](const py::object& self) {
@@ -39,7 +39,7 @@ void bind_feature_types(py::module_& module) {
             return view_of(keypoints.data(), {static_cast<py::ssize_t>(keypoints.size())}, self);
           },
           "Structured array of x_px, y_px, scale and angle_rad, float32, in pixels of the working "
-          "image; read-only, not copied.")
+          "image; read-only and not copied.")
       .def_property_readonly(
           "descriptors",
           [](const py::object& self) -> py::array_t<std::int8_t> {
@@ -48,7 +48,7 @@ void bind_feature_types(py::module_& module) {
             return view_of(values, {static_cast<py::ssize_t>(descriptors.size()), kDescriptorSize},
                            self);
           },
-          "int8, shape (n, 64), each of length 254; read-only, not copied.")
+          "int8, shape (n, 64), each of length 254; read-only and not copied.")
       .def("__len__", [](const Features& self) { return self.keypoints.size(); })
       .def("__repr__", [](const Features& self) {
         return fmt::format("Features({} of {} x {} px)", self.keypoints.size(),
@@ -62,23 +62,23 @@ void bind_feature_types(py::module_& module) {
         return extract_surf(gray_image(pixels), options);
       },
       py::arg("image"), py::arg_v("options", SurfOptions{}, "SurfOptions()"),
-      "SURF features; Bay, Ess, Tuytelaars, Van Gool, CVIU 2008. The image as in saliency_map().");
+      "SURF features; Bay, Ess, Tuytelaars, Van Gool, CVIU 2008. Accepts the same images as "
+      "saliency_map().");
 }
 
 void bind_verification(py::module_& module) {
   py::class_<Verification>(module, "Verification",
-                           "What the geometry of two images says about them showing one place. "
-                           "Matches are structured arrays of query and place, int32: the numbers "
-                           "of two features.")
+                           "The matches and inliers of two images, as structured arrays of query "
+                           "and place, int32: the indices of two features.")
       .def_property_readonly(
           "matches", [](const Verification& self) { return take(self.matches); },
-          "All matches, one to one.")
+          "All one-to-one matches.")
       .def_property_readonly(
           "inliers", [](const Verification& self) { return take(self.inliers); },
-          "Those that one epipolar geometry explains.")
+          "The matches that fit one epipolar geometry.")
       .def_property_readonly(
           "distinct_inliers", [](const Verification& self) { return self.distinct_inliers; },
-          "How many inliers are independent evidence.")
+          "Number of inliers that count as independent evidence.")
       .def("__repr__", [](const Verification& self) {
         return fmt::format("Verification(matches={}, inliers={}, distinct_inliers={})",
                            self.matches.size(), self.inliers.size(), self.distinct_inliers);
@@ -94,12 +94,12 @@ void bind_verification(py::module_& module) {
         return take(std::move(matches));
       },
       py::arg("query"), py::arg("place"), py::arg("max_ratio"),
-      "Mutual best matches that pass the ratio test from either side: structured array of query "
-      "and place.");
+      "Mutual best matches that pass the ratio test from both sides, as a structured array of "
+      "query and place.");
   module.def("verify", &verify, py::arg("query"), py::arg("place"),
              py::arg_v("options", VerificationOptions{}, "VerificationOptions()"),
              py::call_guard<WithoutGil>(),
-             "Step 3 for one candidate: matching, then geometry by RANSAC with a fixed seed.");
+             "Step 3 for one candidate: matching, then RANSAC with a fixed seed.");
 }
 
 }  // namespace

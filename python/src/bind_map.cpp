@@ -65,13 +65,13 @@ std::vector<LoopRow> loops_of(MapReader& map) {
   return rows;
 }
 
-/// What a method of a map without parameters returns.
+/// Calls a method of a map that has no parameters.
 template <auto method, typename Map>
 auto call(Map& map) {
   return map.exclusively([](auto& free) { return (free.*method)(); });
 }
 
-/// What `rows_of` collects, as an array; the GIL is free meanwhile.
+/// The rows of `rows_of` as an array. Releases the GIL while collecting them.
 template <typename Row>
 py::array array_of(SharedReader& map, std::vector<Row> (*rows_of)(MapReader&)) {
   std::vector<Row> rows;
@@ -82,7 +82,7 @@ py::array array_of(SharedReader& map, std::vector<Row> (*rows_of)(MapReader&)) {
   return take(std::move(rows));
 }
 
-/// Throws TypeError unless `row` is one of places().
+/// Throws TypeError unless `row` is a row of places().
 MapPlace place_of(const py::object& row) {
   try {
     const auto number = [&](const char* name) { return row[name].cast<std::int64_t>(); };
@@ -111,14 +111,14 @@ std::optional<py::bytes> image_of(SharedReader& map, const py::object& row) {
 }
 
 void bind_session_frame(py::module_& module) {
-  py::class_<SessionFrame>(module, "SessionFrame", "A frame of one of a map's sessions.")
+  py::class_<SessionFrame>(module, "SessionFrame", "A frame of a session of a map.")
       .def(py::init([](int session, int frame) {
              return SessionFrame{session, frame};
            }),
            whole("session"), whole("frame"))
       .def_readonly("session", &SessionFrame::session,
-                    "From 1, in the order in which the map met them.")
-      .def_readonly("frame", &SessionFrame::frame, "In its session, from 0.")
+                    "Number of the session, from 1, in the order in which they were added.")
+      .def_readonly("frame", &SessionFrame::frame, "Number of the frame in its session, from 0.")
       .def(
           "__eq__", [](const SessionFrame& a, const SessionFrame& b) { return a == b; },
           py::is_operator())
@@ -132,16 +132,18 @@ void bind_session_frame(py::module_& module) {
 }
 
 void bind_session(py::module_& module) {
-  py::class_<MapSession>(module, "MapSession", "One continuous recording in a map.")
-      .def_readonly("session", &MapSession::session, "From 1; never given twice in a map.")
+  py::class_<MapSession>(module, "MapSession", "A session of a map: one continuous recording.")
+      .def_readonly("session", &MapSession::session,
+                    "Number of the session, from 1; never reused in a map.")
       .def_readonly("uid", &MapSession::uid,
                     "32 hexadecimal digits, the same in every copy of the session.")
-      .def_property_readonly("name", text_of(&MapSession::name),
-                             "What was read, as the user named it.")
-      .def_readonly("started", &MapSession::started, "UTC, '2026-11-21T15:04:05Z'.")
-      .def_readonly("loopbit", &MapSession::loopbit, "The version that wrote it.")
-      .def_readonly("options", &MapSession::options, "Of its detector, as to_json() gives them.")
-      .def_readonly("frames", &MapSession::frames, "With the unreadable ones, which are no places.")
+      .def_property_readonly("name", text_of(&MapSession::name), "The input, as the user named it.")
+      .def_readonly("started", &MapSession::started, "UTC, such as '2026-11-21T15:04:05Z'.")
+      .def_readonly("loopbit", &MapSession::loopbit, "The version of loopbit that wrote it.")
+      .def_readonly("options", &MapSession::options,
+                    "The settings of its detector, as in to_json().")
+      .def_readonly("frames", &MapSession::frames,
+                    "Number of frames, including unreadable ones, which have no place.")
       .def("__repr__", [](const MapSession& self) {
         return fmt::format("MapSession({}, {}, started {}, {} frames)", self.session,
                            literal(py::cast(Text{self.name})), self.started, self.frames);
@@ -151,38 +153,40 @@ void bind_session(py::module_& module) {
 void bind_reader(py::module_& module) {
   py::class_<SharedReader, SharedMap, std::shared_ptr<SharedReader>>(
       module, "MapReader",
-      "A map on disk, to be read, also while it is being written: a reader sees what was committed "
-      "when it looked. What is damaged is left out, never guessed.")
-      .def(py::init<const std::filesystem::path&>(), py::arg("path"), Free(),
-           "Raises InputError if there is no map, or one that cannot be read.")
+      "Reads a map, also while it is being written. Each read sees what is committed at that time. "
+      "Damaged rows are left out.")
+      .def(
+          py::init<const std::filesystem::path&, std::size_t>(), py::arg("path"),
+          py::arg("cache_mb") = kMapCache_mb, Free(),
+          "Raises InputError if the map is missing or cannot be read. cache_mb limits the features "
+          "kept in memory, in MiB.")
       .def_property_readonly("sessions",
                              py::cpp_function(&call<&MapReader::sessions, SharedReader>, Free()),
-                             "Those that were there when it was opened, in order.")
+                             "The sessions that existed when the map was opened, in order.")
       .def_property_readonly(
           "options", py::cpp_function(&call<&MapReader::options, SharedReader>, Free()),
-          "The defaults, with the settings that the map's places were made with; InputError if no "
-          "session says.")
+          "The defaults with the settings of the map's places. Raises InputError if no session has "
+          "them.")
       .def(
           "places", [](SharedReader& self) { return array_of(self, places_of); },
-          "All places that are whole, in order of id: structured array of id, session, frame, "
-          "timestamp_s (nan where there is none) and content (64 words, for BinaryContent()). Half "
-          "a kilobyte a place; features are not touched.")
+          "All undamaged places in order of id: structured array of id, session, frame, "
+          "timestamp_s (nan if there is none) and content (64 words, for BinaryContent()). Half a "
+          "kilobyte per place; features are not read.")
       .def(
           "loops", [](SharedReader& self) { return array_of(self, loops_of); },
-          "All loops that are whole, in the order in which they were found: structured array of "
+          "All undamaged loops in the order in which they were found: structured array of "
           "query_session, query_frame, match_session, match_frame, score, similarity, matches and "
           "inliers.")
       .def("features_of", &features_of, py::arg("place"),
-           "The features of a place, a row of places(); None if they are lost.")
-      .def(
-          "image_of", &image_of, py::arg("place"),
-          "The bytes of a small JPEG file of a place, a row of places(); None if none was kept, or "
-          "if it is lost.")
+           "The features of a place, which is a row of places(); None if they are damaged.")
+      .def("image_of", &image_of, py::arg("place"),
+           "The small JPEG of a place, which is a row of places(), as bytes; None if it was not "
+           "kept or is damaged.")
       .def_property_readonly("damage",
                              py::cpp_function(&call<&MapReader::damage, SharedReader>, Free()),
-                             "One clause for each thing found damaged so far.")
+                             "The damage found so far, one clause each.")
       .def("check_structure", &call<&MapReader::check_structure, SharedReader>, Free(),
-           "What SQLite's integrity_check says of the file; empty if all is well.")
+           "The errors that SQLite's integrity_check reports; empty if there are none.")
       .def("__repr__", [](const SharedReader& self) {
         return fmt::format("MapReader({})", literal(py::cast(Text{self.path()})));
       });
@@ -191,35 +195,37 @@ void bind_reader(py::module_& module) {
 void bind_writer(py::module_& module) {
   py::class_<SharedWriter, SharedMap, std::shared_ptr<SharedWriter>>(
       module, "MapWriter",
-      "A map on disk that a LoopDetector continues with a session of its own. A map has one "
-      "writer. Frames are committed in batches of 32 or, at the latest, after a second. In a with "
-      "statement, finish() is called at its end.")
+      "Writes a new session of a LoopDetector to a map. A map has one writer. Frames are committed "
+      "in batches of 32, or after one second. The with statement calls finish() at its end. In a "
+      "forked child, every use raises OptionError.")
       .def(
           py::init([](const std::filesystem::path& path, const LoopDetectorOptions& options,
-                      const std::filesystem::path& name, bool keep_images) {
-            return std::make_shared<SharedWriter>(path, options, name.string(), keep_images);
+                      const std::filesystem::path& name, bool keep_images, std::size_t cache_mb) {
+            return std::make_shared<SharedWriter>(path, options, name.string(), keep_images,
+                                                  cache_mb);
           }),
           py::arg("path"), py::arg("options"), py::arg("name"), py::arg("keep_images") = false,
-          Free(),
-          "Creates or continues a map; the name says what the session reads. Raises OutputError if "
-          "it has a writer or cannot be written, OptionError if it was made with other settings of "
-          "binary_content or surf. keep_images: a small JPEG of each place, too. A session without "
-          "frames leaves no trace.")
+          py::arg("cache_mb") = kMapCache_mb, Free(),
+          "Creates or continues a map. name describes the input of the session. keep_images also "
+          "stores a small JPEG of each place. cache_mb limits the features kept in memory, in MiB. "
+          "A session without frames is not stored. Raises OutputError if the map has a writer or "
+          "cannot be written, and OptionError if it was made with other settings of "
+          "binary_content or surf.")
       .def_property_readonly("session",
                              py::cpp_function(&call<&MapWriter::session, SharedWriter>, Free()),
-                             "The number of the session that is written.")
+                             "Number of the session that is being written.")
       .def_property_readonly(
           "saved_frames", py::cpp_function(&call<&MapWriter::saved_frames, SharedWriter>, Free()),
-          "Frames of this session that are committed: nothing takes them away again.")
+          "Number of committed frames of this session. They survive crashes.")
       .def_property_readonly("damage",
                              py::cpp_function(&call<&MapWriter::damage, SharedWriter>, Free()),
-                             "As MapReader's: what candidates were found to have lost.")
+                             "The damage found in candidates so far, one clause each.")
       .def("flush", &call<&MapWriter::flush, SharedWriter>, Free(),
            "Commits what was added so far.")
       .def(
           "finish", &call<&MapWriter::finish, SharedWriter>, Free(),
-          "Commits the rest and closes the file. A detector of this map is of no use afterwards. A "
-          "writer that nobody holds any more does the same, and keeps its error to itself.")
+          "Commits the rest and closes the file. A detector of this map cannot be used afterwards. "
+          "An unused writer does the same when it is collected, but ignores errors.")
       .def("__enter__", [](const std::shared_ptr<SharedWriter>& self) { return self; })
       .def(
           "__exit__",
@@ -240,7 +246,7 @@ void bind_map(py::module_& module) {
   bind_session_frame(module);
   bind_session(module);
   py::class_<SharedMap, std::shared_ptr<SharedMap>>(
-      module, "MapStorage", "What a LoopDetector needs of a map: a MapReader or a MapWriter.")
+      module, "MapStorage", "Base of MapReader and MapWriter, for LoopDetector.")
       .def_property_readonly("path", [](const SharedMap& self) { return Text{self.path()}; });
   bind_reader(module);
   bind_writer(module);

@@ -24,27 +24,28 @@ using Path = std::filesystem::path;
 using Free = py::call_guard<WithoutGil>;
 
 void bind_results(py::module_& module) {
-  py::class_<MapCheck>(module, "MapCheck", "What there is in a map, and what of it is damaged.")
+  py::class_<MapCheck>(module, "MapCheck", "The content of a map and its damage.")
       .def_readonly("sessions", &MapCheck::sessions)
-      .def_readonly("places", &MapCheck::places, "Whole, with their features.")
+      .def_readonly("places", &MapCheck::places, "Number of undamaged places with their features.")
       .def_readonly("loops", &MapCheck::loops)
-      .def_readonly("images", &MapCheck::images, "Whole.")
-      .def_readonly("damage", &MapCheck::damage, "A clause a thing; empty if all is well.")
+      .def_readonly("images", &MapCheck::images, "Number of undamaged images.")
+      .def_readonly("damage", &MapCheck::damage,
+                    "The damage, one clause each; empty if there is none.")
       .def("__repr__", [](const MapCheck& self) {
         return fmt::format("MapCheck(sessions={}, places={}, loops={}, images={}, damage={})",
                            self.sessions, self.places, self.loops, self.images, self.damage.size());
       });
-  py::class_<MergeCounts>(module, "MergeCounts", "What merging copied.")
+  py::class_<MergeCounts>(module, "MergeCounts", "The result of merge_map().")
       .def_readonly("sessions", &MergeCounts::sessions)
       .def_readonly("places", &MergeCounts::places)
       .def_readonly("loops", &MergeCounts::loops)
       .def_readonly("known", &MergeCounts::known,
-                    "Sessions that were there before, told by their uid.")
+                    "Sessions that the map already had, compared by uid.")
       .def("__repr__", [](const MergeCounts& self) {
         return fmt::format("MergeCounts(sessions={}, places={}, loops={}, known={})", self.sessions,
                            self.places, self.loops, self.known);
       });
-  py::class_<CompactCounts>(module, "CompactCounts", "What compacting kept.")
+  py::class_<CompactCounts>(module, "CompactCounts", "The result of compact_map().")
       .def_readonly("places_before", &CompactCounts::places_before)
       .def_readonly("places_after", &CompactCounts::places_after)
       .def_readonly("bytes_before", &CompactCounts::bytes_before)
@@ -62,18 +63,18 @@ void bind_map_tools(py::module_& module) {
   bind_results(module);
   module.def(
       "check_map", [](const Path& path) { return check_map(path.string()); }, py::arg("path"),
-      Free(), "Reads every byte of a map. Raises InputError as MapReader does.");
+      Free(), "Checks a map by reading every byte. Raises InputError like MapReader.");
   module.def(
       "recover_map",
       [](const Path& path, const Path& to) { return recover_map(path.string(), to.string()); },
       py::arg("path"), py::arg("to"), Free(),
-      "Copies what is whole of a damaged map to a new one, under the same numbers.");
+      "Copies all undamaged rows of a map to a new map, under the same numbers.");
   module.def(
       "merge_map",
       [](const Path& into, const Path& other) { return merge_map(into.string(), other.string()); },
       py::arg("into"), py::arg("other"), Free(),
-      "Adds to a map, made if there is none, the sessions of another that it lacks, with their "
-      "places and loops; all of them or nothing.");
+      "Copies the sessions of another map that this one lacks, with their places and loops. Copies "
+      "everything or nothing. Creates the map if there is none.");
   module.def(
       "compact_map",
       [](const Path& path, std::vector<int> drop_sessions, std::int64_t max_places,
@@ -88,11 +89,11 @@ void bind_map_tools(py::module_& module) {
       py::arg("path"), py::kw_only(), whole("drop_sessions") = CompactOptions{}.drop_sessions,
       whole("max_places") = CompactOptions{}.max_places,
       py::arg("drop_images") = CompactOptions{}.drop_images, Free(),
-      "Forgets sessions with their places and loops, then the places least missed beyond "
-      "max_places (0: none), and the images, and gives their space back. The new file replaces the "
-      "old one in one step.");
-  py::enum_<ExportFormat>(module, "ExportFormat", "How loops are written; see export_loops().")
-      .value("csv", ExportFormat::csv, "a row a loop, which evaluate() reads")
+      "Drops sessions with their places and loops, then redundant places above max_places (0 = no "
+      "limit), and images if asked, and frees their space. The new file replaces the old one in "
+      "one step.");
+  py::enum_<ExportFormat>(module, "ExportFormat", "The format of export_loops().")
+      .value("csv", ExportFormat::csv, "one row per loop; evaluate() reads it")
       .value("json", ExportFormat::json, "sessions and loops")
       .value("g2o", ExportFormat::g2o, "edges of a pose graph, without poses");
   module.def(
@@ -101,8 +102,7 @@ void bind_map_tools(py::module_& module) {
         return map.exclusively([&](MapReader& reader) { return export_loops(reader, format); });
       },
       py::arg("map"), py::arg("format"), Free(),
-      "The loops of a map as edges of a graph. Frames are numbered through all sessions, in order "
-      "of session.");
+      "The loops of a map as text. Frames are numbered consecutively through all sessions.");
 }
 
 }  // namespace loopbit::python

@@ -27,7 +27,7 @@ std::string class_name(std::string_view section) {
   return name + "Options";
 }
 
-/// The part of `options` called `name`, as a reference into it, or null.
+/// The section `name` of `options`, as a reference into it, or null.
 py::object section_of(const py::object& options, std::string_view name) {
   py::object found;
   for_each_section(options.cast<LoopDetectorOptions&>(), [&](std::string_view section, auto& part) {
@@ -59,7 +59,8 @@ void bind_sections(py::class_<LoopDetectorOptions>& type) {
   LoopDetectorOptions defaults;
   for_each_section(defaults, [&](const char* name, const auto&) {
     signature += fmt::format(", {}: {} = ...", name, class_name(name));
-    const std::string doc = fmt::format("{}: changing it changes these options", class_name(name));
+    const std::string doc =
+        fmt::format("{}: a reference; changing it changes these options", class_name(name));
     type.def_property(
         name, [name](const py::object& self) { return section_of(self, name); },
         [name](LoopDetectorOptions& self, const py::object& value) {
@@ -84,11 +85,11 @@ void bind_options(py::module_& module) {
   for_each_section(sections, [&](const char* name, const auto& part) {
     using Part = std::remove_cvref_t<decltype(part)>;
     bind_settings<Part>(module, class_name(name).c_str(), name,
-                        fmt::format("The section '{}' of the settings.", name));
+                        fmt::format("Section '{}' of the settings.", name));
   });
   py::class_<LoopDetectorOptions> type(
       module, "LoopDetectorOptions",
-      "Every setting of a LoopDetector, by sections. The defaults are meant for all data.");
+      "All settings of a LoopDetector, by section. The defaults are meant for all data.");
   bind_sections(type);
   type.def("__repr__", [](const py::object& self) {
     std::string text;
@@ -102,12 +103,13 @@ void bind_options(py::module_& module) {
                       [](const py::str& json) { return options_from_json(json, "a pickle"); }));
   module.def(
       "to_json", [](const LoopDetectorOptions& options) { return to_json(options); },
-      py::arg("options"), "The settings as a settings file for load_options() or --config.");
+      py::arg("options"), "The settings as JSON, for load_options() or --config.");
   module.def("options_from_json", &options_from_json, py::arg("json"), py::arg("source") = "json",
-             "The defaults changed by what the JSON text names; source is named in errors.");
+             "The defaults, changed by the settings in the JSON text. Errors mention source.");
   module.def(
       "load_options", [](const std::filesystem::path& path) { return load_options(path.string()); },
-      py::arg("path"), py::call_guard<WithoutGil>(), "options_from_json() of a file.");
+      py::arg("path"), py::call_guard<WithoutGil>(),
+      "Reads a settings file; see options_from_json().");
   module.def(
       "set_option",
       [](LoopDetectorOptions& options, const std::string& name, const py::object& value) {
@@ -121,7 +123,7 @@ void bind_options(py::module_& module) {
       "Sets one setting by its full name, such as set_option(options, 'surf.max_keypoints', 500).");
   module.def(
       "validate", [](const LoopDetectorOptions& options) { validate(options); }, py::arg("options"),
-      "Raises OptionError where settings contradict each other.");
+      "Raises OptionError if settings contradict each other.");
 }
 
 }  // namespace loopbit::python

@@ -24,14 +24,14 @@ void bind_place_index(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(Candidate, place, similarity);
   py::class_<PlaceIndex>(
       module, "PlaceIndex",
-      "The binary contents of all places, and the question which of them look like a query.")
+      "Stores the binary contents of all places, and finds those most similar to a query.")
       .def(py::init<>())
-      // The GIL is kept: it lets one thread add at a time, which is what the index allows.
+      // Keeps the GIL, so that only one thread adds at a time, as the index requires.
       .def("add", &PlaceIndex::add, py::arg("content"), "Adds a place and returns its number.")
       .def("__len__", &PlaceIndex::size)
       .def(
           "content", [](const PlaceIndex& self, PlaceId place) { return self.content(place); },
-          whole("place"), "A place's content. Raises IndexError where there is none.")
+          whole("place"), "The content of a place. Raises IndexError if there is no such place.")
       .def(
           "query",
           [](const PlaceIndex& self, const BinaryContent& content, std::optional<PlaceId> end,
@@ -45,8 +45,8 @@ void bind_place_index(py::module_& module) {
           },
           py::arg("content"), py::arg("end") = py::none(),
           py::arg_v("options", RetrievalOptions{}, "RetrievalOptions()"),
-          "The most similar places among those numbered below end (None: all), best first, exactly "
-          "as a full scan would find them: structured array of place and similarity.")
+          "The most similar places among those numbered below end (None = all), best first, as a "
+          "structured array of place and similarity. The result equals that of a full scan.")
       .def("__repr__", [](const PlaceIndex& self) {
         return fmt::format("PlaceIndex({} places)", self.size());
       });

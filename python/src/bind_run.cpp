@@ -26,7 +26,7 @@
 namespace loopbit::python {
 namespace {
 
-/// A function of Python's that is told one thing, or None.
+/// A Python callback with one argument, or None.
 template <typename Told>
 class Callback : public pybind11::object {
  public:
@@ -61,7 +61,7 @@ using OnBadFrame = Callback<Text>;
 using PositionRows = py::array_t<double, py::array::c_style | py::array::forcecast>;
 using Free = py::call_guard<WithoutGil>;
 
-/// What Python is told between two frames.
+/// The callbacks between two frames.
 template <typename Told>
 void tell(const Callback<Told>& callback, const Told& told) {
   const WithGil acquire;
@@ -71,6 +71,12 @@ void tell(const Callback<Told>& callback, const Told& told) {
   const auto result = py::reinterpret_steal<py::object>(
       unless_ended([&] { return PyObject_CallObject(callback.ptr(), arguments.ptr()); }));
   if (!result) throw py::error_already_set();
+}
+
+/// Told like a bad frame, and last.
+void tell_early_end(const ImageSource& source, const OnBadFrame& on_bad_frame) {
+  const std::string why = source.early_end();
+  if (!why.empty()) tell(on_bad_frame, Text{why});
 }
 
 std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector,
@@ -87,6 +93,7 @@ std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector
   {
     const WithoutGil release;
     detector.exclusively([&](LoopDetector& free) { run(source, free, listener, never); });
+    tell_early_end(source, on_bad_frame);
   }
   return detections;
 }
@@ -110,6 +117,7 @@ void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_ba
   const std::atomic<bool> never{false};
   const WithoutGil release;
   recorded.detect(source, listener, keep_evidence, never);
+  tell_early_end(source, on_bad_frame);
 }
 
 void keep_positions(RecordedRun& recorded, const PositionRows& positions_m) {
@@ -123,7 +131,7 @@ void keep_positions(RecordedRun& recorded, const PositionRows& positions_m) {
   recorded.keep_positions(rows);
 }
 
-/// For the package's run_folder(), as loopbit run uses RecordedRun.
+/// For run_folder() of the package, which uses RecordedRun like the command.
 void bind_recorded_run(py::module_& module) {
   py::class_<RecordedRun>(module, "_RecordedRun")
       .def(py::init([](SharedSource& source, const Path& out, const LoopDetectorOptions& options,
@@ -167,25 +175,25 @@ std::map<PlaceId, BinaryContent> contents_of(const FinishedRun& run) {
 }
 
 void bind_finished_run(py::module_& module) {
-  py::class_<FinishedRun>(module, "FinishedRun", "What a run left in its folder.")
+  py::class_<FinishedRun>(module, "FinishedRun", "The folder of a run.")
       .def_property_readonly("path", text_of(&FinishedRun::path))
-      .def_readonly("detections", &FinishedRun::detections, "A Detection a frame.")
-      .def_readonly("truth", &FinishedRun::truth, "As it was given to the run, or None.")
+      .def_readonly("detections", &FinishedRun::detections, "One Detection per frame.")
+      .def_readonly("truth", &FinishedRun::truth,
+                    "The ground truth that the run was given, or None.")
       .def_readonly(
           "record_json", &FinishedRun::record_json,
-          "run.json; empty where there is none. Its stopped_by is 'running' until the run ends.")
+          "The text of run.json, or empty. Its stopped_by is 'running' until the run ends.")
       .def_property_readonly(
           "positions_m", [](const FinishedRun& self) { return to_array(self.positions_m); },
-          "Camera centres, shape (n, 3), nan where not known; n is 0 where the "
-          "run had no poses.")
+          "Camera centres, shape (n, 3), nan if unknown; n is 0 if the run had no poses.")
       .def("contents", &contents_of, Free(),
-           "The binary content of each readable frame, by its number; none without evidence.")
+           "The binary content of each readable frame, by frame number; empty without evidence.")
       .def("__repr__", [](const FinishedRun& self) {
         return Text{fmt::format("FinishedRun('{}', {} frames)", self.path, self.detections.size())};
       });
   module.def(
       "read_run", [](const Path& path) { return read_run(path.string()); }, py::arg("path"), Free(),
-      "Reads a run folder, also one whose run was cut off.");
+      "Reads a run folder, also of an interrupted run.");
 }
 
 }  // namespace
@@ -193,7 +201,7 @@ void bind_finished_run(py::module_& module) {
 void bind_run(py::module_& module) {
   bind_finished_run(module);
   module.def("match_list", &match_list, py::arg("detections"), Free(),
-             "What detections say, as any detector's list would.");
+             "Converts detections to a MatchList.");
   module.def("_run", &run_source, py::arg("source"), py::arg("detector"), py::arg("on_detection"),
              py::arg("on_bad_frame"));
   bind_recorded_run(module);

@@ -22,7 +22,7 @@ namespace py = pybind11;
 
 using Free = py::call_guard<WithoutGil>;
 
-/// Throws Error unless `world` has that frame.
+/// Throws Error if `world` does not have the frame.
 void check_frame(const World& world, int frame) {
   if (frame >= 0 && frame < world.options().frames) return;
   throw Error(ErrorKind::option, fmt::format("frame is {}, but must be between 0 and {}.", frame,
@@ -34,9 +34,9 @@ void check_frame(const World& world, int frame) {
 void bind_world(py::module_& module) {
   bind_settings<WorldOptions>(module, "WorldOptions", "world", "Settings of the built-in world.");
   py::class_<World, std::shared_ptr<World>>(module, "World",
-                                            "A town, a drive through it, and what is exactly true "
-                                            "about that drive. The same options give "
-                                            "the same pictures on every machine.")
+                                            "A town, a drive through it, and its exact ground "
+                                            "truth. The same options give the same images on every "
+                                            "machine.")
       .def(py::init([](const WorldOptions& options) {
              const WorldOptions own = options;  // others may change it while the GIL is free
              const WithoutGil release;
@@ -56,7 +56,7 @@ void bind_world(py::module_& module) {
             }
             return to_array(image);
           },
-          whole("frame"), "What the camera sees: BGR, uint8. About 25 ms for 640 x 480.")
+          whole("frame"), "The camera image, BGR, uint8. About 25 ms for 640 x 480.")
       .def(
           "pose",
           [](const World& self, int frame) {
@@ -64,7 +64,7 @@ void bind_world(py::module_& module) {
             const Pose pose = self.pose(frame);
             return std::tuple(pose.x_m, pose.y_m, pose.heading_rad);
           },
-          whole("frame"), "(x_m, y_m, heading_rad): east, north, from east to north.")
+          whole("frame"), "(x_m, y_m, heading_rad): x east, y north, heading from east to north.")
       .def(
           "truth",
           [](const World& self) {
@@ -73,13 +73,13 @@ void bind_world(py::module_& module) {
             truth.near_place = self.near_place();
             return truth;
           },
-          Free(), "What is true about the drive.")
+          Free(), "The ground truth of the drive.")
       .def(
           "source",
           [](const std::shared_ptr<World>& self) {
             return std::make_unique<SharedSource>(make_world_source(self), "built-in world");
           },
-          "The drive as a sequence of images, 10 frames a second.")
+          "The drive as a sequence of images, 10 frames per second.")
       .def(
           "write_dataset",
           [](const World& self, const std::filesystem::path& folder) {

@@ -8,8 +8,8 @@
 
 namespace loopbit::python {
 
-// Each adds one group of types and functions to the module, in an order in which a type comes
-// before what uses it.
+// Each function adds one group of types and functions to the module. Their order is such that types
+// come before their uses.
 void bind_errors(pybind11::module_& module);
 void bind_options(pybind11::module_& module);
 void bind_content(pybind11::module_& module);
@@ -24,15 +24,15 @@ void bind_world(pybind11::module_& module);
 void bind_run(pybind11::module_& module);
 void bind_report(pybind11::module_& module);
 
-/// What work of many frames calls between two of them, with or without the GIL: throws what the
-/// interpreter's own signals raise, such as KeyboardInterrupt.
+/// Called between two frames of long work, with or without the GIL. Throws what signals raise, such
+/// as KeyboardInterrupt.
 inline void check_signals() {
   const WithGil acquire;
   if (unless_ended([] { return PyErr_CheckSignals(); }) != 0) throw pybind11::error_already_set();
 }
 
-/// An argument for whole numbers: what has a fraction is refused, where pybind11 would drop it from
-/// numbers that are not Python's own, such as numpy.float32.
+/// An integer argument. It refuses fractions, which pybind11 would drop from foreign number types
+/// such as numpy.float32.
 inline pybind11::arg whole(const char* name) { return pybind11::arg(name).noconvert(); }
 
 }  // namespace loopbit::python

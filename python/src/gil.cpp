@@ -8,7 +8,7 @@
 namespace loopbit::python {
 namespace {
 
-/// Of this thread, while it is without the GIL; else null.
+/// The state of this thread while it does not hold the GIL; otherwise null.
 thread_local PyThreadState* waiting = nullptr;
 
 void give_up() {

@@ -9,13 +9,14 @@
 
 namespace loopbit::python {
 
-// Who has the GIL. While the interpreter ends, other threads do not get it any more: before Python
-// 3.14 each is ended where it asks for it, by unwinding its stack. Destructors of C++ would then
-// run without the GIL, and the first noexcept function aborts the process. Here such a thread stops
-// for ever instead, as of Python 3.14. So nothing but these takes the GIL, or calls what a user
-// wrote in Python.
+// Handling of the GIL. While the interpreter ends, other threads cannot acquire it. Before
+// Python 3.14 such a thread is ended by unwinding its stack. C++ destructors would then run without
+// the GIL, and the first noexcept function would abort the process. Here such a thread blocks
+// forever instead, as in Python 3.14. Therefore only these functions acquire the GIL or call Python
+// code of the user.
 
-/// What `call` returns, a call of Python's C functions; or never, if Python ends this thread there.
+/// Returns the result of `call`, a call of Python's C functions. Never returns if Python ends this
+/// thread there.
 template <typename Call>
 auto unless_ended(const Call& call) {
   try {
@@ -25,7 +26,7 @@ auto unless_ended(const Call& call) {
   }
 }
 
-/// The GIL is free while it lives.
+/// Releases the GIL during its lifetime.
 class WithoutGil {
  public:
   WithoutGil();
@@ -36,7 +37,7 @@ class WithoutGil {
   WithoutGil& operator=(WithoutGil&&) = delete;
 };
 
-/// Within a WithoutGil of the same thread, or where there is none: the GIL is held while it lives.
+/// Holds the GIL during its lifetime, inside or outside a WithoutGil of the same thread.
 class WithGil {
  public:
   WithGil();

@@ -11,16 +11,16 @@
 PYBIND11_MODULE(_loopbit, module) {
   namespace python = loopbit::python;
   module.doc() = "The compiled part of loopbit; import loopbit instead.";
-  // What it defines belongs to the package, for who reads a signature or a pickle.
+  // Types belong to the package, so that signatures and pickles name it.
   const pybind11::object own_name = module.attr("__name__");
   module.attr("__name__") = "loopbit";
   module.attr("__version__") = loopbit::kVersion;
-  // Bad images are reported by loopbit, in its own words.
+  // loopbit reports bad images itself.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
   python::bind_errors(module);
   module.def(
       "active_kernel", [] { return to_string(loopbit::active_instruction_set()); },
-      "The instruction set whose inner loops run: scalar, avx2, avx512 or, on Arm, dotprod; "
+      "The instruction set of the inner loops: scalar, avx2, avx512 or, on Arm, dotprod. "
       "LOOPBIT_KERNEL forces one.");
   python::bind_options(module);
   python::bind_content(module);

@@ -19,11 +19,11 @@ namespace py = pybind11;
 template <typename Value>
 using Values = py::array_t<Value, py::array::c_style | py::array::forcecast>;
 
-/// `argument` as an array whose dtype is of one of numpy's `kinds`, which `words` name.
+/// `argument` as an array whose dtype is one of numpy's `kinds`; errors call them `words`.
 py::array array_of(const ArrayLike& argument, const char* name, std::string_view kinds,
                    const char* words) {
   py::array array = py::module_::import("numpy").attr("asarray")(argument);
-  // Nothing says what an empty list is a list of.
+  // An empty list has no element type.
   if (array.size() > 0 && kinds.find(array.dtype().kind()) == std::string_view::npos) {
     throw py::type_error(fmt::format("{} has dtype {}, but must be {}.", name,
                                      std::string(py::str(array.dtype())), words));

@@ -8,7 +8,7 @@
 
 namespace loopbit::python {
 
-/// An argument that must be an array, or what numpy makes one of.
+/// An argument that must be an array or convertible to one.
 class ArrayLike : public pybind11::object {
  public:
   static bool accept(PyObject* object) { return object != nullptr && object != Py_None; }
@@ -17,17 +17,16 @@ class ArrayLike : public pybind11::object {
 
 using FrameTable = pybind11::array_t<int, pybind11::array::c_style | pybind11::array::forcecast>;
 
-// What an argument called `name` holds, with nothing rounded, wrapped or guessed. They throw
-// TypeError for another dtype, and ValueError for another shape or for a bad value, and tell its
-// row.
+// Convert an argument called `name` without rounding, wrapping or guessing. They throw TypeError
+// for another dtype, and ValueError with the row for another shape or a bad value.
 
-/// Numbers of frames, of any shape.
+/// Frame numbers of any shape.
 FrameTable to_frame_table(const ArrayLike& argument, const char* name);
-/// Numbers of frames, one a row.
+/// Frame numbers, one per row.
 std::vector<int> to_frames(const ArrayLike& argument, const char* name);
-/// Neither NaN nor infinite, one a row.
+/// Finite numbers, one per row.
 std::vector<double> to_numbers(const ArrayLike& argument, const char* name);
-/// Truth values, also as 0 and 1, one a row.
+/// Booleans, also as 0 and 1, one per row.
 std::vector<bool> to_flags(const ArrayLike& argument, const char* name);
 
 }  // namespace loopbit::python

@@ -37,7 +37,7 @@ int channels_of(const py::array& array, const char* name) {
                   name, text(array.attr("shape")), kMaxSide_px));
 }
 
-/// Whether each row is contiguous and rows do not overlap, which is all that cv::Mat needs.
+/// Whether each row is contiguous and rows do not overlap, as cv::Mat requires.
 bool has_whole_rows(const py::array& array) {
   const py::ssize_t pixel =
       array.ndim() == 3 ? array.shape(2) * array.itemsize() : array.itemsize();
@@ -67,7 +67,7 @@ cv::Mat to_image(ImageArgument& argument, const char* name) {
     array = py::module_::import("numpy").attr("ascontiguousarray")(array);
     argument = py::reinterpret_borrow<ImageArgument>(array);
   }
-  // cv::Mat has no constructor for memory that is only read; nothing here writes to it.
+  // cv::Mat has no constructor for read-only memory; nothing here writes to it.
   // NOLINTNEXTLINE(cppcoreguidelines-pro-type-const-cast)
   return {height, width, CV_MAKETYPE(depth, channels), const_cast<void*>(array.data()),
           static_cast<std::size_t>(array.strides(0))};

@@ -10,7 +10,7 @@
 
 namespace loopbit::python {
 
-/// An argument that must be an image; to_image() says why it is none.
+/// An argument that must be an image; to_image() raises the error if it is not.
 class ImageArgument : public pybind11::object {
  public:
   static bool accept(PyObject* object) { return object != nullptr; }
@@ -18,18 +18,18 @@ class ImageArgument : public pybind11::object {
 };
 
 /// The pixels of a numpy array of shape (h, w), (h, w, 3) or (h, w, 4), uint8 or uint16, as BGR or
-/// BGRA. Where each row is contiguous they are shared, not copied, and valid as long as the array
-/// that `argument` is changed to hold. Throws TypeError for another type and ValueError for another
-/// shape, which call the argument `name`.
+/// BGRA. If each row is contiguous they are shared, not copied, and valid as long as the array that
+/// `argument` then holds. Throws TypeError for another type and ValueError for another shape; the
+/// messages call the argument `name`.
 cv::Mat to_image(ImageArgument& argument, const char* name);
 
-/// The same memory as an array: nothing is copied, and `image` is kept alive by it. None if empty.
+/// The same memory as an array, without a copy; it keeps `image` alive. None if empty.
 pybind11::object to_array(const cv::Mat& image);
 
-/// Shape (n, 3), nan where there is none.
+/// Shape (n, 3), nan for missing values.
 pybind11::array_t<double> to_array(const std::vector<std::optional<cv::Vec3d>>& positions_m);
 
-/// An array over memory that `owner` keeps alive, without a copy.
+/// An array over memory of `owner`, without a copy.
 template <typename Value>
 pybind11::array view_of(const Value* values, std::vector<pybind11::ssize_t> shape,
                         pybind11::handle owner, bool writeable = false) {
@@ -38,7 +38,7 @@ pybind11::array view_of(const Value* values, std::vector<pybind11::ssize_t> shap
   return view;
 }
 
-/// An array that owns `values`, without a copy of them.
+/// An array that owns `values`, without a copy.
 template <typename Value>
 pybind11::array take(std::vector<Value> values) {
   auto* owned = new std::vector<Value>(std::move(values));

@@ -12,7 +12,7 @@
 
 namespace loopbit::python {
 
-/// How Python writes a value.
+/// The Python literal of a value.
 inline std::string literal(const pybind11::handle& value) { return pybind11::repr(value); }
 
 template <typename Value>
@@ -21,11 +21,11 @@ const char* python_type() {
   return std::is_same_v<Value, int> ? "int" : "float";
 }
 
-/// `value` in C++, or TypeError, which calls it `name`.
+/// Converts `value` to C++. Throws TypeError, which calls it `name`.
 template <typename Value>
 Value cast_value(const pybind11::handle& value, const std::string& name) {
   pybind11::detail::make_caster<Value> caster;
-  // Everything is a truth value to Python, and a Decimal a whole number, but not to us.
+  // Stricter than Python, which accepts any object as a bool and a Decimal as an int.
   constexpr bool kConvert = std::is_same_v<Value, double>;
   if (!caster.load(value, kConvert)) {
     throw pybind11::type_error(
@@ -34,7 +34,7 @@ Value cast_value(const pybind11::handle& value, const std::string& name) {
   return pybind11::detail::cast_op<Value>(caster);
 }
 
-/// Sets one field of an options struct. Throws TypeError, or Error where it is out of range.
+/// Sets one field of an options struct. Throws TypeError, or Error if it is out of range.
 template <typename Struct, typename Value>
 void set_setting(Struct& options, const Field<Struct, Value>& field, const std::string& section,
                  const pybind11::handle& value) {
@@ -72,8 +72,8 @@ std::string settings_text(const Struct& options, const char* format) {
   return text;
 }
 
-/// Binds an options struct by its fields(): a keyword and a property each, with the help and the
-/// range that stand there, and the default that stands in the struct.
+/// Binds an options struct by its fields(): one keyword and one property per field, with its help,
+/// range and default.
 template <typename Struct>
 void bind_settings(pybind11::module_& module, const char* name, const std::string& section,
                    const std::string& doc) {

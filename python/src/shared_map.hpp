@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -14,15 +15,15 @@
 
 namespace loopbit::python {
 
-/// A map that several Python threads and one detector may hold: one at a time uses it. All but the
-/// constructor and path() must be called without the GIL: see SharedDetector.
+/// A map that several Python threads and one detector may share. It serves one at a time. Call all
+/// functions but the constructor and path() without the GIL; see SharedDetector.
 class SharedMap : public MapStorage {
  public:
   explicit SharedMap(std::string path) : path_(std::move(path)) {}
 
   [[nodiscard]] const std::string& path() const { return path_; }
 
-  /// What a detector of the map must be given; nothing if the map does not say.
+  /// The options that a detector of the map needs; none if the map has no options.
   [[nodiscard]] virtual std::optional<LoopDetectorOptions> options() const = 0;
 
   void check_options(const LoopDetectorOptions& options) final;
@@ -33,9 +34,13 @@ class SharedMap : public MapStorage {
            std::shared_ptr<const Features> features, const cv::Mat& image) final;
 
  protected:
-  [[nodiscard]] std::scoped_lock<std::mutex> lock() const { return std::scoped_lock(mutex_); }
+  [[nodiscard]] std::scoped_lock<std::mutex> lock() const {
+    check_process();  // first: in a forked child a thread of the parent may hold the mutex for ever
+    return std::scoped_lock(mutex_);
+  }
 
  private:
+  virtual void check_process() const {}
   [[nodiscard]] virtual MapStorage& storage() = 0;
 
   std::string path_;
@@ -44,12 +49,12 @@ class SharedMap : public MapStorage {
 
 class SharedReader : public SharedMap {
  public:
-  explicit SharedReader(const std::filesystem::path& path)
-      : SharedMap(path.string()), reader_(path.string()) {}
+  SharedReader(const std::filesystem::path& path, std::size_t cache_mb)
+      : SharedMap(path.string()), reader_(path.string(), cache_mb) {}
 
   [[nodiscard]] std::optional<LoopDetectorOptions> options() const override;
 
-  /// Calls use(reader) while nobody else may, and returns what it returns.
+  /// Calls use(reader) exclusively and returns its result.
   template <typename Use>
   auto exclusively(Use&& use) {
     const auto guard = lock();
@@ -65,10 +70,11 @@ class SharedReader : public SharedMap {
 class SharedWriter : public SharedMap {
  public:
   SharedWriter(const std::filesystem::path& path, const LoopDetectorOptions& options,
-               const std::string& name, bool keep_images)
+               const std::string& name, bool keep_images, std::size_t cache_mb)
       : SharedMap(path.string()),
         options_(options),
-        writer_(path.string(), options, name, keep_images ? picture_jpeg : EncodeImage{}) {}
+        writer_(path.string(), options, name, keep_images ? picture_jpeg : EncodeImage{},
+                cache_mb) {}
 
   [[nodiscard]] std::optional<LoopDetectorOptions> options() const override { return options_; }
 
@@ -80,6 +86,7 @@ class SharedWriter : public SharedMap {
   }
 
  private:
+  void check_process() const override { writer_.check_process(); }
   [[nodiscard]] MapStorage& storage() override { return writer_; }
 
   LoopDetectorOptions options_;

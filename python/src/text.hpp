@@ -9,8 +9,8 @@
 
 namespace loopbit::python {
 
-/// What is told to Python and may hold the name of a file, which need not be UTF-8: it becomes a
-/// str as Python's own functions give file names.
+/// Text for Python that may contain a file name, which may not be UTF-8. It becomes a str like the
+/// file names of Python's own functions.
 struct Text {
   std::string bytes;
 };

@@ -19,7 +19,7 @@ void parse_number(const std::string& text, const std::string& name, const char* 
   const auto parsed = std::from_chars(text.data(), end, value);
   if (parsed.ec == std::errc{} && parsed.ptr == end) return;
   if (parsed.ec == std::errc::result_out_of_range && parsed.ptr == end) {
-    kind = "neither so large nor so small";
+    kind = "within the range of its type";
   }
   throw Error(ErrorKind::option, fmt::format("{} is '{}', but must be {}.", name, text, kind));
 }

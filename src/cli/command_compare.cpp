@@ -10,6 +10,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/evaluation.hpp"
+#include "loopbit/printable.hpp"
 #include "loopbit/run_folder.hpp"
 
 #include "commands.hpp"
@@ -68,7 +69,7 @@ FramesRead share_frames(std::vector<ListedRun>& runs) {
       if (static_cast<std::size_t>(match.query) < known->frames.times_s.size()) continue;
       throw Error(
           ErrorKind::input,
-          fmt::format("'{}' tells of frame {}, but '{}' has {} frames; compare runs on the "
+          fmt::format("'{}' has a match for frame {}, but '{}' has {} frames; compare runs on the "
                       "same images.",
                       run.run.name, match.query, known->run.name, known->frames.times_s.size()));
     }
@@ -94,7 +95,7 @@ std::vector<ReportRun> read_runs(const CompareFlags& flags) {
   const auto judged = std::find_if(runs.begin(), runs.end(),
                                    [](const ReportRun& run) { return run.truth.has_value(); });
   if (judged == runs.end()) {
-    throw Error(ErrorKind::option, "None of the runs says what is true; add --truth FILE.");
+    throw Error(ErrorKind::option, "None of the runs has ground truth; add --truth FILE.");
   }
   for (ReportRun& run : runs) {
     run.truth = judged->truth;
@@ -112,7 +113,7 @@ Row row_of(const ReportRun& run) {
 
 void print_table(const std::vector<Row>& rows) {
   std::size_t width = 4;
-  for (const Row& row : rows) width = std::max(width, row.name.size());
+  for (const Row& row : rows) width = std::max(width, printable(row.name).size());
   fmt::print(
       "{:<{}}  revisits  recall  precision  wrong  R@100%P  avg.prec.  pair recall   mean ms    "
       "p99 ms\n",
@@ -122,8 +123,8 @@ void print_table(const std::vector<Row>& rows) {
     const auto of_revisits = [&](double share) {
       return share_text(share, e.decision.positives, 4);
     };
-    fmt::print("{:<{}}  {:8}  {:>6}     {:>6}  {:5}   {:>6}     {:>6}       {:>6}", row.name, width,
-               e.decision.positives, of_revisits(e.decision.recall()),
+    fmt::print("{:<{}}  {:8}  {:>6}     {:>6}  {:5}   {:>6}     {:>6}       {:>6}",
+               printable(row.name), width, e.decision.positives, of_revisits(e.decision.recall()),
                share_text(e.decision.precision(), e.decision.right + e.decision.wrong, 4),
                e.decision.wrong, of_revisits(e.recall_at_full_precision),
                of_revisits(e.average_precision),
@@ -154,7 +155,7 @@ void compare_command(const CompareFlags& flags) {
     print_json(rows);
   } else {
     print_table(rows);
-    if (!flags.out.empty()) fmt::print("report     {}\n", flags.out);
+    if (!flags.out.empty()) fmt::print("report     {}\n", printable(flags.out));
   }
   if (flags.open) open_page(flags.out);
 }
@@ -163,17 +164,16 @@ void compare_command(const CompareFlags& flags) {
 
 void add_compare(CLI::App& app) {
   auto flags = std::make_shared<CompareFlags>();
-  CLI::App* command =
-      app.add_subcommand("compare", "Set runs or detectors on the same images side by side");
+  CLI::App* command = app.add_subcommand("compare", "Compare runs or detectors on the same images");
   command
       ->add_option("RUN", flags->runs,
-                   "Two or more, each a run folder or a CSV of query,match[,score], as PATH or "
+                   "Two or more run folders or CSV files of query,match[,score], each as PATH or "
                    "NAME=PATH")
       ->required()
       ->expected(2, 64);
-  CLI::Option* out = command->add_option("--out", flags->out, "Write one page that shows them all")
+  CLI::Option* out = command->add_option("--out", flags->out, "Write one page that shows all runs")
                          ->type_name("FILE");
-  command->add_flag("--open", flags->open, "Show the page in the browser")->needs(out);
+  command->add_flag("--open", flags->open, "Open the page in the browser")->needs(out);
   command->add_flag("--json", flags->json, "Print the table as JSON");
   add_report_flag(*command, flags->report);
   flags->truth.add_to(*command);

@@ -48,8 +48,8 @@ void check_nothing_is_detected(const DemoFlags& flags) {
     if (option->count() == 0) continue;
     throw Error(
         ErrorKind::option,
-        fmt::format("{} is about detecting, which --write-images does not do; leave out one "
-                    "of them.",
+        fmt::format("{} cannot be used with --write-images, which detects nothing; leave out "
+                    "one of them.",
                     option->get_name()));
   }
 }
@@ -75,7 +75,7 @@ int demo_command(const DemoFlags& flags, const Arguments& arguments) {
                                                  name));
     }
   }
-  flags.truth.check(1, static_cast<std::size_t>(std::max(0, options.frames)));
+  flags.truth.check(1, static_cast<std::size_t>(std::max(0, options.frames)), true);
   const auto world = std::make_shared<const World>(options);
   if (!flags.images.empty()) {
     check_nothing_is_detected(flags);
@@ -88,7 +88,7 @@ int demo_command(const DemoFlags& flags, const Arguments& arguments) {
   session.arguments = arguments;
   session.truth_files = flags.truth.files();
   session.truth_description =
-      flags.truth.given() ? flags.truth.description() : "exact: the world is built in";
+      flags.truth.given() ? flags.truth.description() : "exact (built-in world)";
   session.evaluation = flags.truth.evaluation();
   session.truth = [&](const FrameTimes& times_s) {
     const GroundTruth built_in{.same_place = world->same_place(),
@@ -113,7 +113,7 @@ std::string list_world_settings() {
 void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
   auto flags = std::make_shared<DemoFlags>();
   CLI::App* command =
-      app.add_subcommand("demo", "Find the loops of a drive through the built-in world");
+      app.add_subcommand("demo", "Run the built-in world, whose true loops are known");
   command->footer(list_world_settings() + list_truth_settings());
   flags->session.out = "loopbit_demo";
   CLI::Option* out = command
@@ -126,7 +126,7 @@ void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
   command->add_option("--frames", flags->world.frames, "Frames in the whole drive")
       ->type_name("N")
       ->capture_default_str();
-  command->add_option("--seed", flags->world.seed, "Another seed is another town")
+  command->add_option("--seed", flags->world.seed, "Random seed of the town")
       ->type_name("S")
       ->capture_default_str();
   command->add_option("--world", flags->world_settings, "One setting of the world; may be repeated")
@@ -134,7 +134,7 @@ void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
       ->allow_extra_args(false);
   command
       ->add_option("--write-images", flags->images,
-                   "Write the drive as a data set with its truth, and detect nothing")
+                   "Write the drive as a data set with ground truth, without detecting loops")
       ->type_name("DIR")
       ->excludes(out);
   flags->truth.add_to(*command);

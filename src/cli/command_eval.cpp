@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/evaluation.hpp"
+#include "loopbit/printable.hpp"
 #include "loopbit/protocol.hpp"
 
 #include "commands.hpp"
@@ -68,7 +69,7 @@ std::string described(const std::string& protocol) {
   for (const Protocol& known : protocols()) {
     if (known.name == protocol) return fmt::format("{}: {}", known.name, known.help);
   }
-  return protocol;
+  return printable(protocol);
 }
 
 void print_wrong(const std::vector<ReportedMatch>& wrong) {
@@ -106,10 +107,11 @@ void eval_command(const EvalFlags& flags) {
 void add_eval(CLI::App& app) {
   auto flags = std::make_shared<EvalFlags>();
   CLI::App* command =
-      app.add_subcommand("eval", "Score the matches of any detector against what is true");
+      app.add_subcommand("eval", "Score the matches of any detector against ground truth");
   command
-      ->add_option("DETECTIONS", flags->detections,
-                   "A run folder, or a CSV of query,match[,score] with or without a row of names")
+      ->add_option(
+          "DETECTIONS", flags->detections,
+          "A run folder, or a CSV file of query,match[,score] with or without a header row")
       ->required();
   flags->truth.add_to(*command);
   command->add_flag("--json", flags->json, "Print all numbers, wrong loops and the curve as JSON");

@@ -11,6 +11,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/map_tools.hpp"
+#include "loopbit/printable.hpp"
 #include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
@@ -66,9 +67,9 @@ void info_command(const std::string& path, bool json) {
     if (!map.sessions().empty()) info["options"] = Json::parse(to_json(map.options()));
     fmt::print("{}\n", dump(info));
   } else {
-    fmt::print("map        {}, {:.1f} MB", path, static_cast<double>(bytes) / 1e6);
+    fmt::print("map        {}, {:.1f} MB", printable(path), static_cast<double>(bytes) / 1e6);
     if (places > 0)
-      fmt::print(", {:.1f} KB a place",
+      fmt::print(", {:.1f} KB per place",
                  static_cast<double>(bytes) / 1e3 / static_cast<double>(places));
     fmt::print("\nsessions   {}\nplaces     {}\nloops      {}\n", map.sessions().size(), places,
                loops);
@@ -77,8 +78,8 @@ void info_command(const std::string& path, bool json) {
                  static_cast<double>(images.bytes) / 1e6);
     }
     for (const MapSession& session : map.sessions()) {
-      fmt::print("  {:>9} {} ({}, {} frames)\n", session.session, session.name, session.started,
-                 session.frames);
+      fmt::print("  {:>9} {} ({}, {} frames)\n", session.session, printable(session.name),
+                 session.started, session.frames);
     }
   }
   warn_of_damage(map);
@@ -105,7 +106,7 @@ void list_command(const std::string& path, bool json) {
                       {"loopbit", s.loopbit}});
     } else {
       fmt::print("{:>7}  {:<20}  {:>9}  {:>9}  {:>9}  {:<32}  {}\n", s.session, s.started, s.frames,
-                 places[s.session], loops[s.session], s.uid, s.name);
+                 places[s.session], loops[s.session], s.uid, printable(s.name));
     }
   }
   if (json) fmt::print("{}\n", dump(list));
@@ -117,7 +118,7 @@ void merge_command(const std::string& into, const std::vector<std::string>& othe
     const MergeCounts counts = merge_map(into, other);
     fmt::print("merged     {}: {} sessions, {} places, {} loops", other, counts.sessions,
                counts.places, counts.loops);
-    if (counts.known > 0) fmt::print("; {} sessions were there before", counts.known);
+    if (counts.known > 0) fmt::print("; {} sessions were already there", counts.known);
     fmt::print("\n");
   }
 }
@@ -150,16 +151,18 @@ int check_command(const std::string& path, const std::string& recover) {
     return success;
   }
   if (!check.damage.empty()) {
-    fmt::print("remedy     loopbit map check {} --recover NEW.db saves what is whole\n", path);
+    fmt::print("remedy     loopbit map check {} --recover NEW.db copies all undamaged rows\n",
+               path);
   }
   return check.damage.empty() ? success : bad_input;
 }
 
 void compact_command(const std::string& path, const CompactOptions& options) {
   if (options.drop_sessions.empty() && options.max_places == 0 && !options.drop_images) {
-    throw Error(ErrorKind::option,
-                "What is to be forgotten? Name sessions by --drop, a number of places by --budget, "
-                "images by --drop-images, or several of them.");
+    throw Error(
+        ErrorKind::option,
+        "There is nothing to compact; add --drop SESSION, --budget PLACES, --drop-images, or "
+        "several of them.");
   }
   const CompactCounts counts = compact_map(path, options);
   fmt::print("places     {} of {} kept\n", counts.places_after, counts.places_before);
@@ -182,12 +185,12 @@ using Flags = std::shared_ptr<MapFlags>;
 
 CLI::App* add_command(CLI::App& map, const Flags& flags, const char* name, const char* what) {
   CLI::App* command = map.add_subcommand(name, what);
-  command->add_option("MAP", flags->map, "A map that 'loopbit run --map' made")->required();
+  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map'")->required();
   return command;
 }
 
 void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
-  CLI::App* info = add_command(map, flags, "info", "Say what is in a map");
+  CLI::App* info = add_command(map, flags, "info", "Print a summary of a map");
   info->add_flag("--json", flags->json, "Print JSON");
   info->callback([flags] { info_command(flags->map, flags->json); });
 
@@ -195,49 +198,49 @@ void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
   list->add_flag("--json", flags->json, "Print JSON");
   list->callback([flags] { list_command(flags->map, flags->json); });
 
-  CLI::App* export_loops = add_command(map, flags, "export", "Write the loops as edges of a graph");
+  CLI::App* export_loops = add_command(map, flags, "export", "Export the loops");
   const std::map<std::string, ExportFormat> formats{
       {"csv", ExportFormat::csv}, {"json", ExportFormat::json}, {"g2o", ExportFormat::g2o}};
   export_loops->add_option("--format", flags->format, "csv (default), json or g2o")
       ->type_name("FORMAT")
       ->transform(CLI::CheckedTransformer(formats));
-  export_loops->add_option("--out", flags->out, "The file to write; default: standard output")
+  export_loops->add_option("--out", flags->out, "Output file; default: standard output")
       ->type_name("FILE");
   export_loops->callback([flags] { export_command(flags->map, flags->format, flags->out); });
 
   CLI::App* images =
-      add_command(map, flags, "images", "Write the images that 'loopbit run --keep-images' kept");
+      add_command(map, flags, "images", "Write the images stored by 'loopbit run --keep-images'");
   images
       ->add_option("--out", flags->out,
-                   "A new folder, for a file SESSION_FRAME.jpg of each place that has an image")
+                   "A new folder; it gets a file SESSION_FRAME.jpg per place with an image")
       ->type_name("DIR")
       ->required();
   images->callback([flags] { images_command(flags->map, flags->out); });
 
-  CLI::App* check = add_command(map, flags, "check", "Read every byte, and say what is damaged");
-  check->add_option("--recover", flags->recover, "Copy what is whole to a new map")
+  CLI::App* check = add_command(map, flags, "check", "Read every byte, and list the damage");
+  check->add_option("--recover", flags->recover, "Copy all undamaged rows to a new map")
       ->type_name("NEW.db");
   check->callback([flags, &exit_code] { exit_code = check_command(flags->map, flags->recover); });
 }
 
 void add_writers(CLI::App& map, const Flags& flags) {
   CLI::App* merge = add_command(map, flags, "merge", "Add the sessions of other maps to a map");
-  merge->add_option("OTHER", flags->others, "Maps to add; sessions that MAP has are left out")
+  merge
+      ->add_option("OTHER", flags->others, "Maps to add; sessions that MAP already has are skipped")
       ->required();
   merge->callback([flags] { merge_command(flags->map, flags->others); });
 
   CLI::App* compact =
-      add_command(map, flags, "compact", "Forget sessions, redundant places or images");
-  compact
-      ->add_option("--drop", flags->compact.drop_sessions, "A session to forget; may be repeated")
+      add_command(map, flags, "compact", "Drop sessions, redundant places or images");
+  compact->add_option("--drop", flags->compact.drop_sessions, "A session to drop; may be repeated")
       ->type_name("SESSION")
       ->allow_extra_args(false);
   compact
       ->add_option("--budget", flags->compact.max_places,
-                   "Keep at most so many places, those that others stand for least")
+                   "Keep at most this many places; the most redundant are dropped first")
       ->type_name("PLACES")
       ->check(whole_number(1, 2'000'000'000));
-  compact->add_flag("--drop-images", flags->compact.drop_images, "Forget the images of places");
+  compact->add_flag("--drop-images", flags->compact.drop_images, "Drop the images of places");
   compact->callback([flags] { compact_command(flags->map, flags->compact); });
 }
 
@@ -245,7 +248,7 @@ void add_writers(CLI::App& map, const Flags& flags) {
 
 void add_map(CLI::App& app, int& exit_code) {
   auto flags = std::make_shared<MapFlags>();
-  CLI::App* map = app.add_subcommand("map", "Look into maps, check, merge and shrink them");
+  CLI::App* map = app.add_subcommand("map", "Inspect, check, merge and shrink maps");
   map->require_subcommand(1);
   add_readers(*map, flags, exit_code);
   add_writers(*map, flags);

@@ -16,11 +16,13 @@
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
+#include "loopbit/printable.hpp"
 
 #include "commands.hpp"
 #include "map_damage.hpp"
 #include "place_images.hpp"
 #include "ranges.hpp"
+#include "session.hpp"
 #include "stop_signal.hpp"
 #include "streams.hpp"
 
@@ -37,7 +39,9 @@ struct QueryFlags {
   std::string watch;
   std::size_t places = 3;
   std::string place_images;
+  std::size_t map_cache_mb = kMapCache_mb;
   std::vector<std::string> settings;
+  int max_megapixels = kMaxMegapixels;
   bool json = false;
 };
 
@@ -47,7 +51,7 @@ LoopDetectorOptions detector_options(const MapReader& map, const QueryFlags& fla
     const auto [name, value] = split_setting(setting);
     if (name.starts_with("binary_content.") || name.starts_with("surf.")) {
       throw Error(ErrorKind::option,
-                  fmt::format("{} is what '{}' was made with, and cannot be changed; make another "
+                  fmt::format("{} is fixed by '{}', which was made with it; make another "
                               "map with 'loopbit run --map'.",
                               name, flags.map));
     }
@@ -76,7 +80,8 @@ void print_row(const std::string& image, std::string_view status, const ShownPla
              shown.image.empty() ? "" : "  ", shown.image);
 }
 
-void print_rows(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
+void print_rows(const std::string& name, Status status, const std::vector<ShownPlace>& places) {
+  const std::string image = printable(name);
   if (places.empty()) fmt::print("{:<24}  {}\n", image, to_string(status));
   for (std::size_t i = 0; i < places.size(); ++i) {
     print_row(i == 0 ? image : "", i == 0 ? to_string(status) : "", places[i]);
@@ -104,7 +109,7 @@ class Relocalizer {
  public:
   explicit Relocalizer(const QueryFlags& flags)
       : flags_(flags),
-        map_(std::make_shared<MapReader>(flags.map)),
+        map_(std::make_shared<MapReader>(flags.map, flags.map_cache_mb)),
         detector_(detector_options(*map_, flags), map_) {
     if (!flags.place_images.empty()) place_images_.emplace(*map_, flags.place_images);
     if (!flags.json) {
@@ -117,11 +122,14 @@ class Relocalizer {
   /// called in it.
   void ask(const std::string& input, const std::string& name) {
     try {
-      const auto source = open_source(input);
+      const auto source = open_source(input, flags_.max_megapixels);
       const std::string own_name = fs::path(input).filename().string();
       for (Frame frame; source->next(frame);) {
         frame.name = frame.name == own_name ? name : (fs::path(name) / frame.name).string();
         answer(frame);
+      }
+      if (const std::string why = source->early_end(); !why.empty()) {
+        tell(fmt::format("loopbit: {}\n", why));
       }
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;
@@ -163,8 +171,7 @@ class Relocalizer {
 
 int query_command(const QueryFlags& flags) {
   if (flags.images.empty() == flags.watch.empty()) {
-    throw Error(ErrorKind::option,
-                "Which images? Name some, or a folder by --watch, but not both.");
+    throw Error(ErrorKind::option, "A query needs either images or --watch DIR; give one of them.");
   }
   Relocalizer relocalizer(flags);
   for (const std::string& image : flags.images) relocalizer.ask(image, image);
@@ -187,24 +194,26 @@ int query_command(const QueryFlags& flags) {
 void add_query(CLI::App& app, int& exit_code) {
   auto flags = std::make_shared<QueryFlags>();
   CLI::App* command =
-      app.add_subcommand("query", "Ask a map which of its places single images show");
-  command->add_option("MAP", flags->map, "A map that 'loopbit run --map' made")->required();
+      app.add_subcommand("query", "Find the places of a map that single images show");
+  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map'")->required();
   command->add_option("IMAGE", flags->images,
-                      "Images, or anything else that 'loopbit run' takes; each is asked about on "
-                      "its own");
+                      "Images, or anything else that 'loopbit run' accepts; each image is a "
+                      "separate query");
   command
       ->add_option("--watch", flags->watch,
-                   "Ask about each image in a folder, and about those to come, until Ctrl-C")
+                   "Query each image of a folder, and new ones as they arrive, until Ctrl-C")
       ->type_name("DIR");
-  command->add_option("--places", flags->places, "Show so many places an image, best first")
+  command->add_option("--places", flags->places, "Number of places to show per image, best first")
       ->type_name("N")
       ->capture_default_str()
       ->check(whole_number(1, 1000));
   command
       ->add_option("--place-images", flags->place_images,
-                   "A new folder for the images of the places shown, if the map keeps any")
+                   "A new folder for the images of the places shown, if the map has any")
       ->type_name("DIR");
-  command->add_flag("--json", flags->json, "Print a JSON object an image, one a line");
+  add_map_cache_flag(*command, flags->map_cache_mb);
+  add_image_flag(*command, flags->max_megapixels);
+  command->add_flag("--json", flags->json, "Print one JSON object per image, one per line");
   command
       ->add_option("--set", flags->settings,
                    "One setting of retrieval, verification or decision; may be repeated")

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/printable.hpp"
 
 #include "commands.hpp"
 #include "open_page.hpp"
@@ -30,16 +31,15 @@ void report_command(const ReportFlags& flags) {
   std::string path = flags.out;
   if (path.empty()) {
     if (!run.run) {
-      throw Error(
-          ErrorKind::option,
-          fmt::format("'{}' is no run folder to write report.html to; add --out FILE.", flags.run));
+      throw Error(ErrorKind::option,
+                  fmt::format("'{}' is not a run folder; add --out FILE for the page.", flags.run));
     }
     path = (std::filesystem::path(flags.run) / "report.html").string();
   }
   write_report(path, {run}, flags.report);
   std::error_code no_file;  // but a device or a pipe
   const auto bytes = std::filesystem::file_size(path, no_file);
-  fmt::print("report     {}{}\n", path,
+  fmt::print("report     {}{}\n", printable(path),
              no_file ? "" : fmt::format(" ({:.1f} MB)", static_cast<double>(bytes) / 1e6));
   if (flags.open) open_page(path);
 }
@@ -48,15 +48,14 @@ void report_command(const ReportFlags& flags) {
 
 void add_report(CLI::App& app) {
   auto flags = std::make_shared<ReportFlags>();
-  CLI::App* command =
-      app.add_subcommand("report", "Write one HTML page that shows what a run found");
+  CLI::App* command = app.add_subcommand("report", "Write an HTML page that shows a run");
   command
       ->add_option("RUN", flags->run,
-                   "A run folder, or a CSV of query,match[,score] of another detector")
+                   "A run folder, or a CSV file of query,match[,score] of another detector")
       ->required();
-  command->add_option("--out", flags->out, "The page to write; default RUN/report.html")
+  command->add_option("--out", flags->out, "Output file; default RUN/report.html")
       ->type_name("FILE");
-  command->add_flag("--open", flags->open, "Show the page in the browser");
+  command->add_flag("--open", flags->open, "Open the page in the browser");
   add_report_flag(*command, flags->report);
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);

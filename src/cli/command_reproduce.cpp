@@ -250,19 +250,19 @@ int reproduce_command(const ReproduceFlags& flags, const Arguments& arguments) {
 void add_reproduce(CLI::App& app, const Arguments& arguments, int& exit_code) {
   auto flags = std::make_shared<ReproduceFlags>();
   CLI::App* command =
-      app.add_subcommand("reproduce", "Run the tables of the paper on the public data sets");
-  command->add_option("DATA", flags->data, "The folder that holds the data sets")->required();
-  command->add_option("--out", flags->session.out, "Folder for the runs, one a data set")
+      app.add_subcommand("reproduce", "Reproduce the tables of the paper on the public data sets");
+  command->add_option("DATA", flags->data, "The folder with the data sets")->required();
+  command->add_option("--out", flags->session.out, "Folder for the runs, one per data set")
       ->type_name("DIR")
       ->required();
   flags->session.add_to(*command);
   command->footer(
-      "Looked for in DATA, as they are published:\n"
+      "Expected in DATA, as published:\n"
       "  KITTI odometry 00, 02, 05: sequences/00/image_0 and poses/00.txt, also below dataset,\n"
       "    kitti or KITTI; scored by --protocol kitti\n"
       "  City Centre, New College: a folder CityCentre or NewCollege with Images and a .mat file\n"
       "    whose name says truth; scored by its cells\n"
-      "What is not there is named and left out.");
+      "Missing sets are listed and skipped.");
   command->callback(
       [flags, &arguments, &exit_code] { exit_code = reproduce_command(*flags, arguments); });
 }

@@ -17,20 +17,24 @@ struct RunFlags {
   std::string input;
   int every = 1;
   int limit = 0;
+  int max_megapixels = kMaxMegapixels;
   TruthFlags truth;
 };
 
 int run_command(const RunFlags& flags, const Arguments& arguments) {
   Session session;
   if (flags.session.out.empty() && flags.session.map.empty()) {
-    throw Error(ErrorKind::option, "Where to? Name a folder by --out, a map by --map, or both.");
+    throw Error(ErrorKind::option, "The run has no output; add --out DIR, --map MAP.db, or both.");
   }
-  session.source = subsample(open_source(flags.input), static_cast<std::size_t>(flags.every),
-                             static_cast<std::size_t>(flags.limit));
-  flags.truth.check(flags.every, exact_size(*session.source, flags.input));
+  session.source =
+      subsample(open_source(flags.input, flags.max_megapixels),
+                static_cast<std::size_t>(flags.every), static_cast<std::size_t>(flags.limit));
+  const std::optional<std::size_t> frames = exact_size(*session.source, flags.input);
+  const bool is_whole = frames && flags.limit == 0;
+  flags.truth.check(flags.every, frames, is_whole);
   session.evaluation = flags.truth.evaluation();
-  session.truth = [&](const FrameTimes& times_s) {
-    return flags.truth.read_truth(times_s, flags.every);
+  session.truth = [&, frames, is_whole](const FrameTimes& times_s) {
+    return flags.truth.read_truth(times_s, flags.every, is_whole && times_s.size() == *frames);
   };
   session.positions = [&](const FrameTimes& times_s) {
     return flags.truth.read_positions(times_s, flags.every);
@@ -57,16 +61,16 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   command
       ->add_option(
           "--out", flags->session.out,
-          "Folder for loops.csv, run.json and report.html; with --map, MAP_session_N unless "
-          "given")
+          "Folder for loops.csv, run.json and report.html; default with --map: MAP_session_N")
       ->type_name("DIR");
   flags->session.add_to(*command);
-  command->add_option("--every", flags->every, "Read every N-th frame only")
+  command->add_option("--every", flags->every, "Read only every N-th frame")
       ->type_name("N")
       ->check(whole_number(1, 1'000'000));
   command->add_option("--limit", flags->limit, "Read at most N frames; 0 = all")
       ->type_name("N")
       ->check(whole_number(0, 2'000'000'000));
+  add_image_flag(*command, flags->max_megapixels);
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
   command->footer(list_truth_settings());

@@ -10,7 +10,7 @@
 
 namespace loopbit::cli {
 
-/// What the command exits with; the README and `loopbit --help` list the same.
+/// Exit codes of the command; docs/run_folder.md and `loopbit --help` list them.
 enum ExitCode : int {
   success = 0,
   internal_error = 1,

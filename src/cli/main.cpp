@@ -4,6 +4,8 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <iostream>
+#include <sstream>
 #include <string>
 #include <system_error>
 
@@ -23,9 +25,8 @@ using loopbit::ErrorKind;
 namespace cli = loopbit::cli;
 
 constexpr const char* kFooter =
-    "Exit codes: 0 done; 2 bad option or setting; 3 input missing or unreadable; 4 output cannot "
-    "be "
-    "written;\n130 interrupted, with what was found until then kept; 1 a fault in loopbit.";
+    "Exit codes: 0 success; 1 internal error; 2 invalid option or setting; 3 input missing or "
+    "unreadable;\n4 output cannot be written; 130 interrupted, results so far are kept.";
 
 int exit_code_of(ErrorKind kind) {
   switch (kind) {
@@ -52,12 +53,13 @@ void check_command(const CLI::App& app, const std::string& name, int at, int arg
     return check_command(*command, fmt::format("{} {}", name, word), at + 1, argc, argv);
   }
   throw loopbit::Error(ErrorKind::option,
-                       fmt::format("There is no {} '{}'; see '{} --help' for those there are.",
+                       fmt::format("There is no {} '{}'; '{} --help' lists them.",
                                    is_option ? "option" : "command", word, name));
 }
 
 int run_command_line(int argc, char** argv) {
-  CLI::App app{"loopbit tells a robot, image by image, whether it has been here before."};
+  CLI::App app{
+      "loopbit detects visual loop closures: whether a camera is back at an earlier place."};
   app.footer(kFooter);
   app.set_version_flag("--version", loopbit::kVersion);
   app.require_subcommand(1);
@@ -76,7 +78,10 @@ int run_command_line(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? cli::success : cli::bad_option;
+    std::ostringstream told;
+    const int code = app.exit(error, std::cout, told);
+    cli::tell(told.str());
+    return code == 0 ? cli::success : cli::bad_option;
   }
   return exit_code;
 }
@@ -101,6 +106,7 @@ int main(int argc, char** argv) {
   // Past a file size limit, let write() fail, which is reported as any full disk is.
   std::signal(SIGXFSZ, SIG_IGN);
   cli::keep_closed_streams_closed();
+  cli::keep_libraries_quiet();
   try {
     return run_and_flush(argc, argv);
   } catch (const loopbit::Error& error) {

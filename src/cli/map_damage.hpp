@@ -9,10 +9,10 @@
 
 namespace loopbit::cli {
 
-/// Says on stderr that what was read so far is not all there was, if so.
+/// Warns on stderr if damaged rows were left out so far.
 void warn_of_damage(const MapReader& map);
 
-/// The same of a map that was written, too.
+/// The same for a map that was also written.
 void warn_of_damage(const std::string& path, const std::vector<std::string>& damage);
 
 }  // namespace loopbit::cli

@@ -6,7 +6,7 @@
 
 namespace loopbit::cli {
 
-/// Shows a file in the user's browser, by xdg-open. Throws Error (kind output) if that fails.
+/// Opens a file in the user's browser with xdg-open. Throws Error (kind output) if that fails.
 void open_page(const std::string& path);
 
 }  // namespace loopbit::cli

@@ -24,7 +24,7 @@ void make_empty_folder(const std::string& folder) {
   if (!is_empty) {
     throw Error(
         ErrorKind::output,
-        fmt::format("'{}' has files, which images might replace; name a new folder.", folder));
+        fmt::format("'{}' has files that images could replace; give a new folder.", folder));
   }
 }
 

@@ -12,17 +12,17 @@
 
 namespace loopbit::cli {
 
-/// A map's images as files SESSION_FRAME.jpg in a folder of their own, each written when first
-/// asked for. The map must outlive it.
+/// Writes images of a map as files SESSION_FRAME.jpg to a new folder, each on first use. The map
+/// must outlive it.
 class PlaceImages {
  public:
   /// Makes the folder. Throws Error (kind output) if it cannot, or if the folder has files.
   PlaceImages(MapReader& map, const std::string& folder);
 
-  /// The image's file; empty if the map has none of that place. Throws Error (kind output).
+  /// The file of an image; empty if the map has no image of the place. Throws Error (kind output).
   std::string file_of(const SessionFrame& at);
 
-  /// Writes all; returns how many there are.
+  /// Writes all images; returns their number.
   std::size_t write_all();
 
  private:

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -76,7 +77,9 @@ std::string Progress::bar() const {
 }
 
 void Progress::clear_line() const {
-  if (on_terminal_) tell("\r\033[K");
+  if (!on_terminal_) return;
+  (void)std::fputs("\r\033[K", stderr);
+  (void)std::fflush(stderr);
 }
 
 }  // namespace loopbit::cli

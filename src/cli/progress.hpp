@@ -9,11 +9,11 @@
 
 namespace loopbit::cli {
 
-/// Tells on stderr how far a run is: one line that renews itself on a terminal, else a plain line
-/// every few seconds.
+/// Shows the progress of a run on stderr: a line that updates itself on a terminal, otherwise a
+/// plain line every few seconds.
 class Progress {
  public:
-  /// `total`: frames in all, where known. `of_detection`: loops are counted, too.
+  /// `total`: number of frames, if known. `of_detection`: also counts loops.
   explicit Progress(std::optional<std::size_t> total, bool of_detection = true);
   ~Progress();
   Progress(const Progress&) = delete;
@@ -21,10 +21,10 @@ class Progress {
   Progress(Progress&&) = delete;
   Progress& operator=(Progress&&) = delete;
 
-  /// One frame more is done; `is_loop` counts it among the loops.
+  /// Counts a frame; `is_loop` also counts a loop.
   void advance(bool is_loop);
 
-  /// A sentence about a bad frame. After the first few they are only counted.
+  /// Prints a sentence about a bad frame. After the first few, they are only counted.
   void report(const std::string& sentence);
 
  private:

@@ -15,7 +15,7 @@ CLI::Validator range(Number min, Number max, const char* type, const char* kind)
     Number value{};
     const bool is_number = CLI::detail::lexical_cast(text, value);
     if (is_number && value >= min && value <= max) return std::string();
-    return fmt::format("'{}' is no {} from {} to {}", text, kind, min, max);
+    return fmt::format("'{}' is not a {} from {} to {}", text, kind, min, max);
   };
   return {check, fmt::format("{} in [{} - {}]", type, min, max)};
 }

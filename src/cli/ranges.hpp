@@ -8,7 +8,7 @@
 
 namespace loopbit::cli {
 
-/// CLI::Range, which takes nan, and says of 2.5 that it is not between 1 and 9.
+/// Replaces CLI::Range, which accepts nan and has a misleading message for 2.5 in 1 to 9.
 CLI::Validator whole_number(std::int64_t min, std::int64_t max);
 CLI::Validator number(double min, double max);
 

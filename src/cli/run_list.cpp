@@ -52,7 +52,7 @@ Json record_of(const FinishedRun& run) {
   if (run.record_json.empty()) return Json::object();
   Json record = Json::parse(run.record_json, nullptr, false);
   if (record.is_object()) return record;
-  throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is no record of a run: it was "
+  throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is not a record of a run: it was "
                                             "changed after loopbit wrote it; run again.",
                                             run.path));
 }
@@ -85,6 +85,8 @@ ListedRun listed_run(const std::string& text) {
     run.evaluation.protocol = value_at(record, "/score/protocol", std::string());
     listed.frames.every = std::max(1, value_at(record, "/input/every", 1));
     listed.frames.views = std::max(1, value_at(record, "/input/views", 1));
+    listed.frames.all = value_at(record, "/stopped_by", std::string()) == "end" &&
+                        value_at(record, "/input/limit", 1) == 0;
   } else {
     run.list = read_match_list(path);
   }
@@ -98,7 +100,7 @@ void take_truth(ReportRun& run, const TruthFlags& flags, const FramesRead& frame
     run.positions_m = std::move(positions);
   }
   if (flags.given()) {
-    run.truth = flags.read_truth(frames.times_s, every);
+    run.truth = flags.read_truth(frames.times_s, every, frames.all);
     run.evaluation = flags.evaluation();
   }
 }
@@ -113,7 +115,7 @@ ReportRun scored_run(const std::string& text, const TruthFlags& flags) {
   ReportRun run = report_run(text, flags);
   if (!run.truth) {
     throw Error(ErrorKind::option,
-                fmt::format("'{}' says nothing about what is true; add --truth FILE.", text));
+                fmt::format("'{}' has no ground truth; add --truth FILE.", text));
   }
   return run;
 }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -29,8 +28,10 @@ namespace {
 
 constexpr std::size_t kFramesReadAhead = 8;
 
+/// No more than there are cores that this process may use: TBB warns of more.
 int thread_count(int wanted) {
-  return wanted > 0 ? wanted : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int cores = cv::getNumberOfCPUs();
+  return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
 void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
@@ -69,14 +70,13 @@ void SessionFlags::add_to(CLI::App& command) {
   command.add_flag("--overwrite", overwrite, "Replace an earlier run in the output folder");
   command
       .add_option("--map", map,
-                  "Continue this map, made if there is none: earlier sessions' places are "
-                  "recognised, too")
+                  "Continue this map, or create it. Places of earlier sessions are recognised")
       ->type_name("MAP.db");
-  command.add_flag("--keep-images", keep_images, "Keep a small JPEG of each place in the map")
+  command.add_flag("--keep-images", keep_images, "Store a small JPEG of each place in the map")
       ->needs("--map");
-  CLI::Option* named =
-      command.add_option("--preset", preset, "Named settings to begin with: default or paper")
-          ->type_name("NAME");
+  add_map_cache_flag(command, map_cache_mb);
+  CLI::Option* named = command.add_option("--preset", preset, "Initial settings: default or paper")
+                           ->type_name("NAME");
   command.add_option("--config", config, "Settings file, JSON; see 'loopbit options --json'")
       ->type_name("FILE")
       ->excludes(named);
@@ -84,20 +84,38 @@ void SessionFlags::add_to(CLI::App& command) {
       .add_option("--set", settings, "One setting, such as surf.max_keypoints=500; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
-  command.add_option("--threads", threads, "Threads; 0 = one a core. Changes no result")
+  command
+      .add_option("--threads", threads,
+                  "Threads, at most one per core; 0 = one per core. Results do not depend on it")
       ->type_name("N")
       ->check(whole_number(0, 1024));
-  command.add_flag("--no-report", no_report, "Keep no pictures and write no report.html");
+  command.add_flag("--no-report", no_report, "Store no pictures and write no report.html");
   add_report_flag(command, report);
+}
+
+void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb) {
+  command
+      .add_option("--map-cache-mb", cache_mb,
+                  "Keep up to this many MiB of the map's features in memory. Changes no result")
+      ->type_name("MB")
+      ->capture_default_str()
+      ->check(whole_number(0, 1'000'000));
 }
 
 void add_report_flag(CLI::App& command, ReportOptions& options) {
   command
       .add_option("--pictures-mb", options.max_pictures_mb,
-                  "Pictures in the report take at most so many megabytes")
+                  "Largest total size of the pictures in the report, megabytes")
       ->type_name("MB")
       ->capture_default_str()
       ->check(number(0.0, 2000.0));
+}
+
+void add_image_flag(CLI::App& command, int& max_megapixels) {
+  command.add_option("--max-megapixels", max_megapixels, "Larger images are unreadable")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(whole_number(1, 1'000'000));
 }
 
 LoopDetectorOptions SessionFlags::detector_options() const {
@@ -131,16 +149,23 @@ int run_session(Session session, const SessionFlags& flags) {
                         .map_path = flags.map,
                         .arguments = session.arguments,
                         .truth = session.truth_description},
-                       {flags.out, flags.overwrite, flags.keep_images, inputs});
-  cv::setNumThreads(std::min(threads, thread_count(0)));  // TBB warns of more
+                       {.folder = flags.out,
+                        .overwrite = flags.overwrite,
+                        .keep_images = flags.keep_images,
+                        .map_cache_mb = flags.map_cache_mb,
+                        .inputs = inputs});
+  cv::setNumThreads(threads);
   if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
   try {
     drive(*session.source, recorded, !flags.no_report, stop_requested);
     warn_of_damage(flags.map, recorded.map_damage());
+    if (const auto& why = recorded.record().early_end; !why.empty()) {
+      tell(fmt::format("loopbit: {}\n", why));
+    }
   } catch (const Error& error) {
     try {
       recorded.finish(error.what());
-    } catch (const Error&) {  // the disk that failed the run fails its record, too
+    } catch (const Error&) {  // the first error is the one to tell
     }
     throw;
   }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "loopbit/evaluation.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector_options.hpp"
+#include "loopbit/map_file.hpp"
 #include "loopbit/report.hpp"
 
 #include "truth_flags.hpp"
@@ -24,11 +26,12 @@ struct SessionFlags {
   std::string out;           ///< empty = beside the map, named after it
   std::string map;           ///< empty = none
   bool keep_images = false;  ///< in the map
+  std::size_t map_cache_mb = kMapCache_mb;
   bool overwrite = false;
   std::string preset = "default";
   std::string config;
   std::vector<std::string> settings;  ///< "section.field=value"
-  int threads = 0;                    ///< 0 = one a core
+  int threads = 0;                    ///< at most one a core; 0 = as many
   bool no_report = false;
   ReportOptions report;
 
@@ -56,6 +59,12 @@ struct Session {
 
 /// Adds the flag for ReportOptions to `command`.
 void add_report_flag(CLI::App& command, ReportOptions& options);
+
+/// Adds the flag for what of a map stays in memory.
+void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb);
+
+/// Adds the flag for open_source()'s largest images to `command`.
+void add_image_flag(CLI::App& command, int& max_megapixels);
 
 /// Runs a detector over the session's images into the folder that `flags` names, with progress on
 /// stderr and a summary on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in order.

@@ -20,6 +20,7 @@ extern "C" void request_stop(int signal) {
 const std::atomic<bool>& stop_on_signal() {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
+  if (std::signal(SIGHUP, request_stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // by nohup
   return stop_requested;
 }
 

@@ -6,7 +6,8 @@
 
 namespace loopbit::cli {
 
-/// From now on, a first SIGINT or SIGTERM turns the result true; a second one ends the process.
+/// From now on, a first SIGINT, SIGTERM or SIGHUP turns the result true; a second one ends the
+/// process. SIGHUP stays ignored if it was.
 const std::atomic<bool>& stop_on_signal();
 
 }  // namespace loopbit::cli

@@ -2,15 +2,63 @@
 // SPDX-License-Identifier: MIT
 #include "streams.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <mutex>
 
 #include <fcntl.h>
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/printable.hpp"
 
 namespace loopbit::cli {
+namespace {
+
+std::FILE* const own_stderr = stderr;
+
+#ifdef __GLIBC__  // where stderr is a variable and may be set
+
+/// What libraries printed last.
+struct Heard {
+  std::mutex mutex;
+  std::array<char, 4096> text{};
+  std::size_t size = 0;
+};
+Heard heard;
+
+ssize_t hear(void* /*cookie*/, const char* text, std::size_t size) {
+  const std::lock_guard lock(heard.mutex);
+  if (heard.size + size > heard.text.size()) heard.size = 0;
+  const std::size_t kept = std::min(size, heard.text.size() - heard.size);
+  std::copy_n(text, kept, heard.text.begin() + static_cast<std::ptrdiff_t>(heard.size));
+  heard.size += kept;
+  return static_cast<ssize_t>(size);
+}
+
+extern "C" void tell_heard(int signal) {
+  [[maybe_unused]] const auto written = write(STDERR_FILENO, heard.text.data(), heard.size);
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
+
+#endif
+
+}  // namespace
+
+void keep_libraries_quiet() {
+#ifdef __GLIBC__
+  std::FILE* const quiet = fopencookie(
+      nullptr, "w", {.read = nullptr, .write = hear, .seek = nullptr, .close = nullptr});
+  if (quiet == nullptr) return;
+  (void)std::setvbuf(quiet, nullptr, _IONBF, 0);
+  stderr = quiet;
+  std::signal(SIGABRT, tell_heard);
+#endif
+}
 
 void keep_closed_streams_closed() {
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
@@ -21,8 +69,8 @@ void keep_closed_streams_closed() {
 }
 
 void tell(const std::string& text) {
-  (void)std::fputs(text.c_str(), stderr);
-  (void)std::fflush(stderr);
+  (void)std::fputs(printable(text).c_str(), own_stderr);
+  (void)std::fflush(own_stderr);
 }
 
 void flush_stdout() {

@@ -9,7 +9,11 @@ namespace loopbit::cli {
 /// Lets no file that is opened later take the place of a closed stdin, stdout or stderr.
 void keep_closed_streams_closed();
 
-/// Writes `text` to stderr. Where that fails there is nobody to tell, and nothing else is lost.
+/// What libraries print to stderr about damaged images and videos is hidden from now on. If the
+/// process aborts, the last of it is shown. loopbit reports damage in its own words, by tell().
+void keep_libraries_quiet();
+
+/// Writes `text`, printable(), to stderr. Errors of stderr itself are ignored.
 void tell(const std::string& text);
 
 /// Throws Error (kind output) if something that was printed did not reach stdout.

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/finished_run.hpp"
+#include "loopbit/printable.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -20,10 +21,10 @@ std::ptrdiff_t count(const std::vector<Detection>& detections, Status status) {
 void print_reasons(const std::vector<Detection>& detections) {
   constexpr std::pair<Status, const char*> kReasons[] = {
       {Status::no_earlier_place, "only recent places to compare with"},
-      {Status::no_similar_place, "no earlier place looks alike"},
+      {Status::no_similar_place, "no earlier place looks similar"},
       {Status::few_matches, "no candidate shares enough features"},
       {Status::no_geometry, "features match, but not as one rigid scene"},
-      {Status::low_score, "a geometry, but too little evidence"},
+      {Status::low_score, "geometry found, but too little evidence"},
       {Status::ambiguous, "enough evidence, but other places share it"},
       {Status::unreadable, "image unreadable"}};
   for (const auto& [status, meaning] : kReasons) {
@@ -43,7 +44,7 @@ void print_score(const DecisionCounts& score) {
 void print_times(const RunRecord& record, const std::vector<Detection>& detections) {
   const auto mean = [&](double StepTimes::*step) { return summarize(detections, step).mean; };
   fmt::print(
-      "speed      {:.1f} frames/s with {} thread{}; a frame's mean: content {:.2f} ms, "
+      "speed      {:.1f} frames/s with {} thread{}; mean per frame: content {:.2f} ms, "
       "retrieval {:.2f} ms, features {:.2f} ms, verification {:.2f} ms\n",
       static_cast<double>(detections.size()) / std::max(record.wall_s, 1e-9), record.threads,
       record.threads == 1 ? "" : "s", mean(&StepTimes::content_ms), mean(&StepTimes::retrieval_ms),
@@ -58,8 +59,10 @@ std::string share_text(double share, std::int64_t whole, int decimals) {
 
 void print_summary(const RunRecord& record, const RunFolder& folder, bool has_report) {
   const auto& detections = folder.detections();
-  fmt::print("input      {} ({}), {} frames{}\n", record.input, record.description,
-             detections.size(), record.stopped_by == "interrupt" ? ", then interrupted" : "");
+  fmt::print("input      {} ({}), {} frames{}{}\n", printable(record.input),
+             printable(record.description), detections.size(),
+             record.stopped_by == "interrupt" ? ", then interrupted" : "",
+             record.early_end.empty() ? "" : ", then cut off");
   const auto loops = count(detections, Status::loop);
   const auto elsewhere = match_list(detections).elsewhere.size();
   fmt::print("loops      {} frame{} at a place seen before{}\n", loops, loops == 1 ? "" : "s",
@@ -67,11 +70,11 @@ void print_summary(const RunRecord& record, const RunFolder& folder, bool has_re
   print_reasons(detections);
   if (record.score) print_score(record.score->decision);
   print_times(record, detections);
-  fmt::print("written    {0}/loops.csv, {0}/run.json\n", folder.path());
+  fmt::print("written    {0}/loops.csv, {0}/run.json\n", printable(folder.path()));
   if (!record.map_path.empty()) {
-    fmt::print("map        {}, session {}\n", record.map_path, record.map_session);
+    fmt::print("map        {}, session {}\n", printable(record.map_path), record.map_session);
   }
-  if (has_report) fmt::print("report     {}\n", folder.report_path());
+  if (has_report) fmt::print("report     {}\n", printable(folder.report_path()));
 }
 
 }  // namespace loopbit::cli

@@ -32,24 +32,24 @@ void TruthFlags::add_to(CLI::App& command) {
   CLI::Option* option_truth =
       command
           .add_option("--truth", truth,
-                      "What is true: CSV of query,first,last or query,match; KITTI poses, a TUM "
+                      "Ground truth: CSV of query,first,last or query,match; KITTI poses, a TUM "
                       "trajectory or EuRoC states; a loop matrix as .mat, text or image")
           ->type_name("FILE");
   command
       .add_option("--not-false", not_false,
-                  "Matches that are not wrong, nor right by this alone; CSV as above")
+                  "Matches that are not wrong, but right only if truth lists them; CSV as above")
       ->type_name("FILE")
       ->needs(option_truth);
-  command.add_option("--ignore", ignore, "Queries that are not scored, one a line")
+  command.add_option("--ignore", ignore, "Queries that are not scored, one per line")
       ->type_name("FILE")
       ->needs(option_truth);
-  command.add_option("--protocol", protocol, "A published way of scoring, listed below")
+  command.add_option("--protocol", protocol, "A published scoring protocol, listed below")
       ->type_name("NAME")
       ->needs(option_truth);
   fixed_by_protocol_[0] =
       command
           .add_option("--tolerance", tolerance_frames,
-                      "A match is right so many frames before or after a true place, too")
+                      "A match this many frames before or after a true place is also right")
           ->type_name("N")
           ->check(whole_number(0, 1'000'000));
   fixed_by_protocol_[1] =
@@ -58,7 +58,7 @@ void TruthFlags::add_to(CLI::App& command) {
           ->allow_extra_args(false);
   fixed_by_protocol_[2] =
       command
-          .add_option("--truth-views", views, "Rows a frame has in a loop matrix (2: left, right)")
+          .add_option("--truth-views", views, "Rows per frame in a loop matrix (2: left, right)")
           ->type_name("N")
           ->check(whole_number(1, 64));
   for (CLI::Option* option :
@@ -73,7 +73,7 @@ void TruthFlags::add_to(CLI::App& command) {
 void TruthFlags::add_poses_to(CLI::App& command) {
   command
       .add_option("--poses", poses,
-                  "KITTI poses, a TUM trajectory or EuRoC states, for the report's map")
+                  "KITTI poses, a TUM trajectory or EuRoC states, for the trajectory in the report")
       ->type_name("FILE");
 }
 
@@ -98,8 +98,8 @@ TruthOptions TruthFlags::truth_options(int every) const {
     const auto [name, value] = split_setting(setting);
     if (!set_field(options.poses, "truth", name, value)) {
       throw Error(ErrorKind::option,
-                  fmt::format("There is no setting '{}' of truth by poses; --help lists those "
-                              "there are.",
+                  fmt::format("There is no setting '{}' of truth by poses; --help lists the "
+                              "settings.",
                               name));
     }
   }
@@ -109,17 +109,20 @@ TruthOptions TruthFlags::truth_options(int every) const {
   return options;
 }
 
-void TruthFlags::check(int every, std::optional<std::size_t> frames) const {
+void TruthFlags::check(int every, std::optional<std::size_t> frames, bool all_read) const {
   (void)evaluation();
   (void)truth_options(every);
-  if (const std::string file = poses_file(); !file.empty()) check_poses(file, frames, every);
+  if (!poses.empty()) check_poses(poses, frames, every);
   if (!given()) return;
   const TruthKind kind = truth_kind(truth);
   check_kind(kind);
   GroundTruth others;
   add_others(others);
-  // What poses say needs the times of the frames.
-  if (kind != TruthKind::poses) (void)read_truth(FrameTimes(frames.value_or(0)), every);
+  if (kind == TruthKind::poses) {  // what they say needs the times of the frames
+    check_poses(truth, frames, every, all_read);
+  } else {
+    (void)read_truth(FrameTimes(frames.value_or(0)), every, all_read);
+  }
 }
 
 std::string TruthFlags::description() const {
@@ -146,14 +149,14 @@ void TruthFlags::check_kind(TruthKind kind) const {
   if (!protocol.empty() && find_protocol(protocol).truth_kind != kind) {
     throw Error(
         ErrorKind::option,
-        fmt::format("--protocol {} is defined on {}, but '{}' is {}; name another file, or "
+        fmt::format("--protocol {} requires {}, but '{}' is {}; give another file, or "
                     "leave out the protocol.",
                     protocol, name_of(find_protocol(protocol).truth_kind), truth, name_of(kind)));
   }
   const auto check_flag = [&](bool is_given, const char* flag, const char* things, bool fits) {
     if (!is_given || fits) return;
     throw Error(ErrorKind::option,
-                fmt::format("{} is about {}, but '{}' is {}; leave it out, or name another file.",
+                fmt::format("{} applies to {}, but '{}' is {}; leave it out, or give another file.",
                             flag, things, truth, name_of(kind)));
   };
   const bool is_matrix = kind == TruthKind::matrix;
@@ -173,10 +176,13 @@ void TruthFlags::add_others(GroundTruth& result) const {
   }
 }
 
-std::optional<GroundTruth> TruthFlags::read_truth(const FrameTimes& times_s, int every) const {
+std::optional<GroundTruth> TruthFlags::read_truth(const FrameTimes& times_s, int every,
+                                                  bool all_read) const {
   if (!given()) return std::nullopt;
   check_kind(truth_kind(truth));
-  GroundTruth result = loopbit::read_truth(truth, truth_options(every), times_s);
+  TruthOptions options = truth_options(every);
+  options.all_read = all_read;
+  GroundTruth result = loopbit::read_truth(truth, options, times_s);
   add_others(result);
   return result;
 }

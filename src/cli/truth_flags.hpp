@@ -44,15 +44,17 @@ struct TruthFlags {
   [[nodiscard]] EvaluationOptions evaluation() const;
 
   /// Throws what read_truth() and read_positions() would, as far as can be told before the frames
-  /// are read: of the sequence every `every`-th will be, so many of them if that is known.
-  void check(int every, std::optional<std::size_t> frames) const;
+  /// are read: of the sequence every `every`-th will be, so many of them if that is known, which
+  /// are all it has if `all_read`.
+  void check(int every, std::optional<std::size_t> frames, bool all_read = false) const;
 
   /// One line that says what is true; empty if no file was named.
   [[nodiscard]] std::string description() const;
 
   /// What is true about the sequence, if a file was named, of which every `every`-th frame was
-  /// read.
-  [[nodiscard]] std::optional<GroundTruth> read_truth(const FrameTimes& times_s, int every) const;
+  /// read, see TruthOptions::all_read.
+  [[nodiscard]] std::optional<GroundTruth> read_truth(const FrameTimes& times_s, int every,
+                                                      bool all_read = false) const;
 
   /// Where the camera was, if poses were named, as such or as the truth; else nothing. Where the
   /// frames are not known, every pose is one.

@@ -51,6 +51,7 @@ Database::Database(std::string path, Access access, Remedies remedies)
   const int result = sqlite3_open_v2(path_.c_str(), &handle, flags, nullptr);
   handle_.reset(handle);  // must be closed even if it could not be opened
   if (result != SQLITE_OK) fail();
+  file_ = std::make_unique<OpenFile>(path_);
   sqlite3_busy_timeout(handle, kBusyTimeout_ms);
   sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kMaxRowBytes);
   const bool reads = access == Access::read;
@@ -73,6 +74,21 @@ void Database::execute(const std::string& sql) const {
 std::int64_t Database::integer(const std::string& sql) const {
   Statement statement(*this, sql);
   return statement.step() ? statement.integer(0) : 0;
+}
+
+Database::Header Database::header() const {
+  Header header{};
+  sqlite3_file* file = nullptr;
+  if (sqlite3_file_control(handle(), "main", SQLITE_FCNTL_FILE_POINTER, &file) != SQLITE_OK) fail();
+  const int result = file->pMethods->xRead(file, header.data(), header.size(), 0);
+  if (result != SQLITE_OK && result != SQLITE_IOERR_SHORT_READ) header = {};
+  return header;
+}
+
+void Database::set_schema_version(std::int32_t version) const {
+  sqlite3_db_config(handle(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);  // which would ignore it
+  execute(fmt::format("PRAGMA schema_version = {}", version));
+  sqlite3_db_config(handle(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
 }
 
 void Database::fail() const {

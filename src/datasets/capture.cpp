@@ -3,7 +3,9 @@
 #include "capture.hpp"
 
 #include <array>
+#include <cstdint>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +13,7 @@
 
 #include "loopbit/error.hpp"
 
+#include "encoded_video.hpp"
 #include "image_file.hpp"
 
 namespace loopbit::datasets {
@@ -26,6 +29,7 @@ class CaptureSource final : public ImageSource {
     std::string description;
     bool has_times = false;
     std::optional<std::size_t> size;
+    std::string early_end = {};  ///< as ImageSource::early_end() at the end
   };
 
   /// Shares `capture`, which is a handle.
@@ -44,7 +48,10 @@ class CaptureSource final : public ImageSource {
   }
 
   bool skip() override {
-    if (!capture_.grab()) return false;
+    if (ended_ || !capture_.grab()) {
+      ended_ = true;
+      return false;
+    }
     if (grabbed_ == 0) first_ms_ = position_ms(capture_);
     ++grabbed_;
     return true;
@@ -53,6 +60,8 @@ class CaptureSource final : public ImageSource {
   [[nodiscard]] std::optional<std::size_t> size() const override { return facts_.size; }
 
   [[nodiscard]] std::string description() const override { return facts_.description; }
+
+  [[nodiscard]] std::string early_end() const override { return ended_ ? facts_.early_end : ""; }
 
  private:
   [[nodiscard]] std::optional<double> timestamp_s() const {
@@ -74,6 +83,7 @@ class CaptureSource final : public ImageSource {
   cv::VideoCapture capture_;
   Facts facts_;
   std::size_t grabbed_ = 0;
+  bool ended_ = false;
   double first_ms_ = 0.0;
 };
 
@@ -113,12 +123,27 @@ std::optional<std::size_t> frame_count(const cv::VideoCapture& capture) {
   return static_cast<std::size_t>(count);
 }
 
+/// Why the video ends before its time; empty if it does not, as far as its container tells.
+std::string early_end(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::uint64_t bytes = std::filesystem::file_size(file, error);
+  const auto declared = declared_bytes(file);
+  if (error || !declared || *declared <= bytes) return {};
+  return fmt::format(
+      "Video '{}' is cut off after {} of at least {} bytes, and its last frames are "
+      "missing: copy it again.",
+      file.string(), bytes, *declared);
+}
+
 }  // namespace
 
-std::unique_ptr<ImageSource> open_video(const std::filesystem::path& file) {
+std::unique_ptr<ImageSource> open_video(const std::filesystem::path& file, int max_megapixels) {
   cv::VideoCapture probe = open_file(file);
+  check_pixel_count(static_cast<std::int64_t>(probe.get(cv::CAP_PROP_FRAME_WIDTH)),
+                    static_cast<std::int64_t>(probe.get(cv::CAP_PROP_FRAME_HEIGHT)), max_megapixels,
+                    fmt::format("Video '{}'", file.string()));
   CaptureSource::Facts facts{fmt::format("video {}", file.filename().string()),
-                             has_times(probe, file), frame_count(probe)};
+                             has_times(probe, file), frame_count(probe), early_end(file)};
   return std::make_unique<CaptureSource>(open_file(file), std::move(facts));
 }
 

@@ -9,8 +9,8 @@
 
 namespace loopbit::datasets {
 
-/// Throws Error (kind input) if `file` is no video or has no frame.
-std::unique_ptr<ImageSource> open_video(const std::filesystem::path& file);
+/// Throws Error (kind input) if `file` is no video, has no frame, or has larger ones.
+std::unique_ptr<ImageSource> open_video(const std::filesystem::path& file, int max_megapixels);
 
 /// `number` from 0 to 99. Throws Error (kind input) if the camera cannot be opened.
 std::unique_ptr<ImageSource> open_camera(int number);

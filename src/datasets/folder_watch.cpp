@@ -20,8 +20,9 @@ namespace fs = std::filesystem;
 FolderWatch::FolderWatch(const std::string& folder) : folder_(folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {
-    throw Error(ErrorKind::input,
-                fmt::format("'{}' is no folder; name one that images come to.", folder));
+    throw Error(
+        ErrorKind::input,
+        fmt::format("'{}' is not a folder; give the folder in which images arrive.", folder));
   }
 }
 
@@ -52,7 +53,7 @@ std::vector<std::string> FolderWatch::arrived() {
   }
   if (error) {
     throw Error(ErrorKind::input,
-                fmt::format("The folder '{}' cannot be read any more ({}); check that it is there.",
+                fmt::format("The folder '{}' can no longer be read ({}); check that it exists.",
                             folder_, error.message()));
   }
   files_ = std::move(there);  // those that are gone are forgotten

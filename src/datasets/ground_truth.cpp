@@ -48,6 +48,12 @@ void check_names(const std::string& path, const datasets::TextRow& row,
   if (names.size() == 3 && (names[1] == "match" || names[2] == "score")) throw_bad_names(path, row);
 }
 
+/// Whether the names say by themselves that these are places, as they must where no row does.
+bool name_places(const std::vector<std::string_view>& names) {
+  return names.size() > 1 && (names[0] == "query" || names[0] == "frame") &&
+         (names[1] == "match" || names[1] == "first");
+}
+
 std::vector<int> thinned(const std::vector<int>& frames, int every) {
   std::vector<int> kept;
   for (const int frame : frames) {
@@ -73,12 +79,14 @@ std::vector<PlaceRun> read_place_runs(const std::string& path) {
   std::vector<PlaceRun> runs;
   std::vector<std::string_view> cells;
   std::size_t columns = 0;
+  std::optional<datasets::TextRow> odd_names;
   for (const auto& row : datasets::read_rows(path)) {
     datasets::split_cells(row.text, cells);
     const bool is_first = columns == 0;
     if (is_first) columns = cells.size();
     if (is_first && datasets::are_names(cells)) {
       check_names(path, row, cells);
+      if (!name_places(cells)) odd_names = row;
       continue;
     }
     const auto run = parse_run(cells);
@@ -89,6 +97,7 @@ std::vector<PlaceRun> read_place_runs(const std::string& path) {
     }
     runs.push_back(*run);
   }
+  if (runs.empty() && odd_names) throw_bad_names(path, *odd_names);
   return runs;
 }
 
@@ -121,6 +130,7 @@ GroundTruth every_nth(const GroundTruth& truth, int every) {
 void write_place_runs(const std::string& path, const std::string& comment,
                       const std::vector<PlaceRun>& runs) {
   std::string text = fmt::format("# {}\n", comment);
+  if (runs.empty()) text += "query,first,last\n";  // as truth, a file without a row says nothing
   for (const PlaceRun& run : runs)
     text += fmt::format("{},{},{}\n", run.query, run.first, run.last);
   write_file(path, text);

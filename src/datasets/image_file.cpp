@@ -17,7 +17,7 @@
 
 #include "loopbit/error.hpp"
 
-#include "truncation.hpp"
+#include "encoded_image.hpp"
 
 namespace loopbit::datasets {
 namespace {
@@ -44,7 +44,7 @@ std::size_t checked_size(const fs::path& file) {
          fmt::format("cannot be found ({}): restore it or take it off the list", error.message()));
   }
   if (!fs::is_regular_file(status)) {
-    fail(image_thing(file), "is a folder or a device: name an image file");
+    fail(image_thing(file), "is a folder, a pipe or a device: name an image file");
   }
   const std::uintmax_t size = fs::file_size(file, error);
   if (error) fail(image_thing(file), fmt::format("has no readable size: {}", error.message()));
@@ -84,18 +84,31 @@ cv::Mat decode(const std::vector<unsigned char>& bytes, const std::string& thing
 
 }  // namespace
 
-cv::Mat read_image_file(const fs::path& file) {
+cv::Mat read_image_file(const fs::path& file, int max_megapixels) {
   const std::string thing = image_thing(file);
   const std::vector<unsigned char> bytes = read_bytes(file);
   if (is_cut_off(bytes)) {
     fail(thing, fmt::format("is cut off after {} bytes: copy it again", bytes.size()));
   }
-  cv::Mat image = decode(bytes, thing);
+  const auto size = declared_size(bytes);
+  if (size) check_pixel_count(size->width, size->height, max_megapixels, thing);
+  cv::Mat image = size ? decode(bytes, thing) : cv::Mat();
   if (image.empty()) {
     fail(thing, "is damaged or not an image: copy it again, or convert it to PNG or JPEG");
   }
   check_pixel_format(image, thing);
   return image;
+}
+
+void check_pixel_count(std::int64_t width, std::int64_t height, int max_megapixels,
+                       const std::string& thing) {
+  constexpr double kMegapixel = 1e6;
+  if (static_cast<double>(width) * static_cast<double>(height) <= max_megapixels * kMegapixel) {
+    return;
+  }
+  fail(thing, fmt::format("has {} x {} pixels, but max_megapixels is {}: scale it down, or raise "
+                          "the limit",
+                          width, height, max_megapixels));
 }
 
 void check_pixel_format(const cv::Mat& image, const std::string& thing) {

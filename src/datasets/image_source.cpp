@@ -25,14 +25,15 @@ constexpr std::string_view kCameraPrefix = "camera:";
 
 class ImageListSource final : public ImageSource {
  public:
-  explicit ImageListSource(datasets::ImageList list) : list_(std::move(list)) {}
+  ImageListSource(datasets::ImageList list, int max_megapixels)
+      : list_(std::move(list)), max_megapixels_(max_megapixels) {}
 
   bool next(Frame& frame) override {
     if (position_ == list_.images.size()) return false;
     const datasets::ListedImage& listed = list_.images[position_++];
     frame = Frame{listed.name, listed.timestamp_s, {}, {}};
     try {
-      frame.image = datasets::read_image_file(list_.root / listed.name);
+      frame.image = datasets::read_image_file(list_.root / listed.name, max_megapixels_);
     } catch (const Error& e) {
       frame.error = e.what();
     }
@@ -51,6 +52,7 @@ class ImageListSource final : public ImageSource {
 
  private:
   datasets::ImageList list_;
+  int max_megapixels_;
   std::size_t position_ = 0;
 };
 
@@ -87,33 +89,45 @@ datasets::ImageList single_image(const fs::path& file) {
   return {file.parent_path(), fmt::format("image {}", name), {{name, {}}}};
 }
 
-std::unique_ptr<ImageSource> open_file(const fs::path& file) {
+bool is_list(const fs::path& file) {
   const std::string extension = datasets::lower_extension(file);
-  if (extension == ".txt" || extension == ".csv") {
-    return std::make_unique<ImageListSource>(datasets::list_file(file));
+  return extension == ".txt" || extension == ".csv";
+}
+
+std::unique_ptr<ImageSource> open_file(const fs::path& file, int max_megapixels) {
+  if (is_list(file)) {
+    return std::make_unique<ImageListSource>(datasets::list_file(file), max_megapixels);
   }
-  if (datasets::is_image_name(file)) return std::make_unique<ImageListSource>(single_image(file));
-  return datasets::open_video(file);
+  if (datasets::is_image_name(file)) {
+    return std::make_unique<ImageListSource>(single_image(file), max_megapixels);
+  }
+  return datasets::open_video(file, max_megapixels);
 }
 
 }  // namespace
 
-std::unique_ptr<ImageSource> open_source(const std::string& input) {
+std::unique_ptr<ImageSource> open_source(const std::string& input, int max_megapixels) {
+  if (max_megapixels < 1) {
+    throw Error(ErrorKind::option,
+                fmt::format("max_megapixels is {}, but must be at least 1.", max_megapixels));
+  }
   if (input.starts_with(kCameraPrefix)) {
     return datasets::open_camera(
         camera_number(std::string_view(input).substr(kCameraPrefix.size())));
   }
   const fs::file_status status = status_of(input);
   if (fs::is_directory(status)) {
-    return std::make_unique<ImageListSource>(datasets::list_folder(input));
+    return std::make_unique<ImageListSource>(datasets::list_folder(input), max_megapixels);
   }
-  if (fs::is_regular_file(status)) return open_file(input);
+  if (fs::is_regular_file(status)) return open_file(input, max_megapixels);
   throw_no_input(input, "is neither a file nor a folder");
 }
 
 std::optional<std::size_t> exact_size(const ImageSource& source, const std::string& input) {
   std::error_code error;
-  return fs::is_directory(input, error) ? source.size() : std::nullopt;
+  const bool of_images =
+      fs::is_directory(input, error) || is_list(input) || datasets::is_image_name(input);
+  return of_images ? source.size() : std::nullopt;
 }
 
 }  // namespace loopbit

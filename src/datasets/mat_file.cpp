@@ -40,7 +40,7 @@ using Variable = std::unique_ptr<matvar_t, FreeVariable>;
 }
 
 [[noreturn]] void fail_damaged(const std::string& path, const std::string& name) {
-  fail_file(path, fmt::format("has a damaged variable '{}': copy it again, or save it anew", name));
+  fail_file(path, fmt::format("has a damaged variable '{}': copy or save it again", name));
 }
 
 /// What libmatio says of a file it would also say on stderr, which is the program's.
@@ -73,7 +73,7 @@ bool is_candidate(const matvar_t& variable) { return is_numeric(variable) && is_
 
 MatFile open(const std::string& path) {
   MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
-  if (!file) fail_file(path, "cannot be read: copy it again, or save it anew with the option -v7");
+  if (!file) fail_file(path, "cannot be read: copy it again, or save it again with the option -v7");
   return file;
 }
 
@@ -95,7 +95,7 @@ Variable find(mat_t* file, const std::string& path, const std::string& wanted) {
                                 fmt::join(candidates, ", ")));
   }
   fail_file(path,
-            fmt::format("holds no {}, but {}: name a square matrix of numbers",
+            fmt::format("has no {}, but {}: give a square matrix of numbers",
                         wanted.empty() ? "square matrix" : fmt::format("variable '{}'", wanted),
                         all.empty() ? "nothing" : fmt::format("{}", fmt::join(all, ", "))));
 }
@@ -104,7 +104,7 @@ TruthMatrix::Shape checked_shape(const matvar_t& variable, const std::string& pa
   const std::string name = name_of(variable);
   if (!is_numeric(variable) || variable.isComplex != 0 || variable.rank != 2) {
     fail_file(path,
-              fmt::format("has a variable '{}' that is no matrix of real numbers: name another, "
+              fmt::format("has a variable '{}' that is not a matrix of real numbers: give another, "
                           "or save a logical or numeric matrix",
                           name));
   }

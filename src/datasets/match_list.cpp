@@ -118,7 +118,7 @@ class Reader {
     const std::size_t expected = list_.times_s.size();
     if (static_cast<std::size_t>(frame) != expected) {
       datasets::throw_bad_row(path_, row,
-                              fmt::format("a frame, in order, of which this is no. {}", expected));
+                              fmt::format("frame {} (frames must be consecutive)", expected));
     }
     const bool has_time = columns_.timestamp && !cells[*columns_.timestamp].empty();
     list_.times_s.emplace_back();
@@ -129,7 +129,7 @@ class Reader {
     const auto frame = datasets::parse_frame(cell);
     if (!frame) {
       datasets::throw_bad_row(path_, row,
-                              fmt::format("of frame numbers from 0, which '{}' is not", cell));
+                              fmt::format("of frame numbers from 0 ('{}' is not one)", cell));
     }
     return *frame;
   }
@@ -137,8 +137,7 @@ class Reader {
   [[nodiscard]] double number(const TextRow& row, std::string_view cell) const {
     const auto number = datasets::parse_number<double>(cell);
     if (!number) {
-      datasets::throw_bad_row(path_, row,
-                              fmt::format("of finite numbers, which '{}' is not", cell));
+      datasets::throw_bad_row(path_, row, fmt::format("of finite numbers ('{}' is not one)", cell));
     }
     return *number;
   }

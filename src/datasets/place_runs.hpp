@@ -8,12 +8,12 @@
 
 namespace loopbit::datasets {
 
-/// Adds to `runs` that `place` shows what `query` shows: lengthens the last run if it can.
-inline void add_place(std::vector<PlaceRun>& runs, int query, int place) {
-  if (!runs.empty() && runs.back().query == query && runs.back().last + 1 == place) {
-    runs.back().last = place;
+/// Adds `places` to `runs`; lengthens the last run if it can.
+inline void add_places(std::vector<PlaceRun>& runs, const PlaceRun& places) {
+  if (!runs.empty() && runs.back().query == places.query && runs.back().last + 1 == places.first) {
+    runs.back().last = places.last;
   } else {
-    runs.push_back({query, place, place});
+    runs.push_back(places);
   }
 }
 

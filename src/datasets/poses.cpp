@@ -146,14 +146,15 @@ bool have_times(const std::vector<CameraPose>& poses) {
 /// See read_positions().
 std::vector<std::optional<cv::Vec3d>> positions_by_row(const std::string& path,
                                                        const std::vector<CameraPose>& poses,
-                                                       std::size_t frames, int every) {
-  check_every(every);
-  if (have_times(poses)) datasets::check_pose_each(path, poses.size(), frames, every);
-  datasets::check_rows(path, poses.size(), "poses", frames, every);
-  const auto step = static_cast<std::size_t>(every);
+                                                       const datasets::FramesRead& frames) {
+  check_every(frames.every);
+  if (have_times(poses)) datasets::check_pose_each(path, poses.size(), frames);
+  datasets::check_rows(path, poses.size(), "poses", frames);
+  const auto step = static_cast<std::size_t>(frames.every);
   std::vector<std::optional<cv::Vec3d>> positions_m;
-  positions_m.reserve(frames);
-  for (std::size_t k = 0; k < frames; ++k) positions_m.emplace_back(poses[k * step].position_m);
+  positions_m.reserve(frames.count);
+  for (std::size_t k = 0; k < frames.count; ++k)
+    positions_m.emplace_back(poses[k * step].position_m);
   return positions_m;
 }
 
@@ -195,21 +196,26 @@ std::vector<std::optional<cv::Vec3d>> read_positions(
   const bool frames_timed =
       std::ranges::any_of(times_s, [](const auto& time) { return time.has_value(); });
   if (!have_times(poses) || (!frames_timed && !times_s.empty())) {
-    return positions_by_row(path, poses, times_s.empty() ? poses.size() : times_s.size(),
-                            times_s.empty() ? 1 : every);
+    return times_s.empty() ? positions_by_row(path, poses, {poses.size()})
+                           : positions_by_row(path, poses, {times_s.size(), every});
   }
   std::vector<std::optional<cv::Vec3d>> positions_m;
   if (times_s.empty()) return positions_m;
   positions_m.reserve(times_s.size());
-  for (const auto& pose : poses_of_frames(poses, times_s)) {
+  const auto of_frames =
+      datasets::made_of_file(path, [&] { return poses_of_frames(poses, times_s); });
+  for (const auto& pose : of_frames) {
     positions_m.push_back(pose ? std::optional(pose->position_m) : std::nullopt);
   }
   return positions_m;
 }
 
-void check_poses(const std::string& path, std::optional<std::size_t> frames, int every) {
+void check_poses(const std::string& path, std::optional<std::size_t> frames, int every,
+                 bool all_read) {
   const std::vector<CameraPose> poses = read_poses(path);
-  if (frames && !have_times(poses)) (void)positions_by_row(path, poses, *frames, every);
+  if (frames && !have_times(poses)) {
+    (void)positions_by_row(path, poses, {*frames, every, all_read});
+  }
 }
 
 }  // namespace loopbit

@@ -58,6 +58,11 @@ class PrefetchSource final : public ImageSource {
   [[nodiscard]] std::optional<std::size_t> size() const override { return size_; }
   [[nodiscard]] std::string description() const override { return description_; }
 
+  [[nodiscard]] std::string early_end() const override {
+    const std::lock_guard lock(mutex_);
+    return ended_ && queue_.empty() ? source_->early_end() : "";
+  }
+
  private:
   void read_all() {
     try {
@@ -86,7 +91,7 @@ class PrefetchSource final : public ImageSource {
   const std::string description_;
   const std::size_t depth_;
 
-  std::mutex mutex_;  ///< guards what follows
+  mutable std::mutex mutex_;  ///< guards what follows
   std::condition_variable changed_;
   std::deque<Frame> queue_;
   std::exception_ptr failure_;

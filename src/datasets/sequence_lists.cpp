@@ -80,7 +80,7 @@ ImageList list_images(const fs::path& folder, std::string description) {
 
 [[noreturn]] void throw_no_rows(const fs::path& file) {
   throw Error(ErrorKind::input,
-              fmt::format("'{}' names no image: give it one line an image.", file.string()));
+              fmt::format("'{}' lists no image: write one image per line.", file.string()));
 }
 
 std::vector<double> read_times(const fs::path& file) {
@@ -178,7 +178,7 @@ ImageList list_folder(const fs::path& folder) {
 ImageList list_file(const fs::path& file) {
   const bool has_columns = lower_extension(file) == ".csv";
   ImageList list{file.parent_path(), fmt::format("image list {}", file.filename().string()), {}};
-  for (const TextRow& row : read_rows(file)) {
+  for (const TextRow& row : read_listed_rows(file)) {
     if (!is_image_name(row.text) || (has_columns && row.text.find(',') != std::string::npos)) {
       throw_bad_row(file, row, fmt::format("one image name ({}) and no more", image_extensions()));
     }

@@ -43,6 +43,8 @@ class Subsample final : public ImageSource {
     return text;
   }
 
+  [[nodiscard]] std::string early_end() const override { return source_->early_end(); }
+
  private:
   /// To the next frame that counts. Skips just before it is asked for, so that a camera is not
   /// waited for in vain.

@@ -3,65 +3,64 @@
 #include "text_rows.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdint>
-#include <fstream>
-#include <system_error>
 
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/printable.hpp"
+#include "loopbit/read_file.hpp"
 
 namespace loopbit::datasets {
-namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uintmax_t kMaxTextBytes = std::uintmax_t{1} << 30U;
+namespace {
+
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 
-/// Fit for a one-line message: control characters are replaced, and a UTF-8 character is not cut.
+/// Fit for a message: printable and short. A UTF-8 character is not cut.
 std::string excerpt(std::string_view text) {
   constexpr std::size_t kMaxBytes = 80;
   std::size_t end = std::min(text.size(), kMaxBytes);
   while (end > 0 && end < text.size() && (text[end] & 0xC0) == 0x80) --end;
-  std::string shown(text.substr(0, end));
-  for (char& c : shown) {
-    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = '?';
-  }
-  return end < text.size() ? shown + "..." : shown;
+  return printable(text.substr(0, end)) + (end < text.size() ? "..." : "");
 }
 
-[[noreturn]] void throw_unreadable(const fs::path& file) {
-  if (errno == ENOENT) {
-    throw Error(ErrorKind::input,
-                fmt::format("'{}' does not exist: correct the path.", file.string()));
+/// Calls visit(part) with what stands before, between and after the separators.
+template <typename Visit>
+void for_each_part(std::string_view text, char separator, const Visit& visit) {
+  for (std::size_t end = text.find(separator); end != text.npos; end = text.find(separator)) {
+    visit(text.substr(0, end));
+    text.remove_prefix(end + 1);
   }
-  throw Error(ErrorKind::input, fmt::format("'{}' cannot be read ({}): check its permissions.",
-                                            file.string(), std::generic_category().message(errno)));
+  visit(text);
+}
+
+std::vector<TextRow> rows_of(std::string_view text) {
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  std::vector<TextRow> rows;
+  std::size_t number = 0;
+  for_each_part(text, '\n', [&](std::string_view line) {
+    ++number;
+    line = trimmed(line);
+    if (!line.empty() && line.front() != '#') rows.push_back({number, std::string(line)});
+  });
+  return rows;
 }
 
 }  // namespace
 
-std::vector<TextRow> read_rows(const fs::path& file) {
-  std::error_code error;
-  if (const auto bytes = fs::file_size(file, error); !error && bytes > kMaxTextBytes) {
-    throw Error(ErrorKind::input,
-                fmt::format("'{}' has {} bytes, but at most {} of text are read: split it.",
-                            file.string(), bytes, kMaxTextBytes));
-  }
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw_unreadable(file);
+std::vector<TextRow> read_rows(const fs::path& file) { return rows_of(read_text(file.string())); }
+
+std::vector<TextRow> read_listed_rows(const fs::path& file) {
+  const std::string text = read_file(file.string());
+  if (text.find('\0') == std::string::npos) return rows_of(text);
   std::vector<TextRow> rows;
-  std::string line;
-  for (std::size_t number = 1; std::getline(stream, line); ++number) {
-    std::string_view text = line;
-    if (number == 1 && text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
-    text = trimmed(text);
-    if (!text.empty() && text.front() != '#') rows.push_back({number, std::string(text)});
-  }
-  if (stream.bad()) throw_unreadable(file);
+  std::size_t number = 0;
+  for_each_part(text, '\0', [&](std::string_view name) {
+    ++number;
+    if (!name.empty()) rows.push_back({number, std::string(name)});
+  });
   return rows;
 }
 

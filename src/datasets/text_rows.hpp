@@ -17,8 +17,12 @@ struct TextRow {
 };
 
 /// All rows of `file` but blank ones and those that begin with `#`. Line ends may be LF or CRLF,
-/// and a byte order mark is dropped. Throws Error (kind input) if the file cannot be read.
+/// and a byte order mark is dropped. Throws as read_text() does.
 std::vector<TextRow> read_rows(const std::filesystem::path& file);
+
+/// As read_rows(); but where `file` holds NUL bytes, as `find -print0` writes them, these alone end
+/// a row, and rows are taken as they stand.
+std::vector<TextRow> read_listed_rows(const std::filesystem::path& file);
 
 /// Without spaces, tabs and carriage returns at its ends.
 std::string_view trimmed(std::string_view text);

@@ -27,6 +27,9 @@ using datasets::TruthMatrix;
 using Times = std::vector<std::optional<double>>;
 
 constexpr std::size_t kFewestMatrixColumns = 13;
+constexpr const char* kNoPlace =
+    "has no true place, so every loop would be wrong: give the truth of this sequence. If it has "
+    "no revisit, give a file whose only row is query,first,last.";
 
 /// Any of its channels.
 template <typename Level>
@@ -58,7 +61,8 @@ TruthMatrix read_mask(const std::string& path, int views) {
                             "original as PNG or .mat.",
                             path));
   }
-  const cv::Mat image = datasets::read_image_file(path);
+  constexpr int kMaxMegapixels = 1000;  // a row of pixels for each of 30,000 images
+  const cv::Mat image = datasets::read_image_file(path, kMaxMegapixels);
   const auto rows = static_cast<std::size_t>(image.rows);
   TruthMatrix matrix(fmt::format("Mask '{}'", path), {rows, static_cast<std::size_t>(image.cols)},
                      views);
@@ -106,17 +110,20 @@ int every_of_matrix(const TruthOptions& options) {
 GroundTruth truth_of(const TruthMatrix& matrix, const std::string& path,
                      const TruthOptions& options, const Times& times_s) {
   const int every = every_of_matrix(options);
-  const auto frames_read = times_s.size();
+  const datasets::FramesRead frames{times_s.size(), every, options.all_read};
   const auto views = static_cast<std::size_t>(options.views);
-  if (every < options.views && frames_read > matrix.frames() &&
-      frames_read <= matrix.frames() * views) {
+  if (every < options.views && frames.count > matrix.frames() &&
+      frames.count <= matrix.frames() * views) {
     throw Error(ErrorKind::input,
                 fmt::format("'{}' has {} frames of {} rows each, and {} images were read: where "
                             "these are its views in turn, read every {}-th.",
-                            path, matrix.frames(), views, frames_read, views));
+                            path, matrix.frames(), views, frames.count, views));
   }
-  datasets::check_rows(path, matrix.frames(), "frames", frames_read, every);
-  return {.same_place = matrix.runs(), .every = every, .frames = static_cast<int>(matrix.frames())};
+  datasets::check_rows(path, matrix.frames(), "frames", frames);
+  GroundTruth truth{
+      .same_place = matrix.runs(), .every = every, .frames = static_cast<int>(matrix.frames())};
+  if (!truth.same_place.empty()) return truth;
+  throw Error(ErrorKind::input, fmt::format("'{}' {}", path, kNoPlace));
 }
 
 /// In the numbers of the whole sequence what is in those of the frames read.
@@ -150,19 +157,30 @@ GroundTruth read_pose_truth(const std::string& path, const TruthOptions& options
                             path));
   }
   if (poses_timed && std::ranges::any_of(times_s, has_time)) {
-    return truth_by_time(poses, options, times_s);
+    return datasets::made_of_file(path, [&] { return truth_by_time(poses, options, times_s); });
   }
-  if (poses_timed) datasets::check_pose_each(path, poses.size(), times_s.size(), options.every);
-  datasets::check_rows(path, poses.size(), "poses", times_s.size(), options.every);
-  GroundTruth truth = truth_from_poses({poses.begin(), poses.end()}, options.poses);
+  const datasets::FramesRead frames{times_s.size(), options.every, options.all_read};
+  if (poses_timed) datasets::check_pose_each(path, poses.size(), frames);
+  datasets::check_rows(path, poses.size(), "poses", frames);
+  GroundTruth truth = datasets::made_of_file(path, [&] {
+    return truth_from_poses({poses.begin(), poses.end()}, options.poses);
+  });
   truth.every = options.every;
   truth.frames = static_cast<int>(poses.size());
   return truth;
 }
 
+GroundTruth read_run_truth(const std::string& path, const TruthOptions& options,
+                           std::size_t frames_read) {
+  const datasets::FramesRead frames{frames_read, options.every, options.all_read};
+  GroundTruth truth{.same_place = read_place_runs(path), .every = options.every};
+  for (const PlaceRun& run : truth.same_place) datasets::check_frame(path, run.query, frames);
+  return truth;
+}
+
 /// The kind of a text file by its first row. Throws if it is none.
 TruthKind text_kind(const std::string& path, const std::vector<TextRow>& rows) {
-  if (rows.empty()) return TruthKind::runs;
+  if (rows.empty()) throw Error(ErrorKind::input, fmt::format("'{}' {}", path, kNoPlace));
   std::vector<std::string_view> cells;
   datasets::split_cells(rows.front().text, cells);
   if (cells.size() == 2 || cells.size() == 3) return TruthKind::runs;
@@ -210,7 +228,7 @@ GroundTruth read_truth(const std::string& path, const TruthOptions& options,
   const std::vector<TextRow> rows = datasets::read_rows(path);
   switch (text_kind(path, rows)) {
     case TruthKind::runs:
-      return {.same_place = read_place_runs(path), .every = options.every};
+      return read_run_truth(path, options, times_s.size());
     case TruthKind::poses:
       return read_pose_truth(path, options, times_s);
     case TruthKind::matrix:

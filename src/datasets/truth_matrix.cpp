@@ -24,9 +24,10 @@ TruthMatrix::TruthMatrix(const std::string& thing, Shape shape, int views)
   assert(views > 0);
   const auto [rows, columns] = shape;
   if (rows != columns) {
-    throw Error(ErrorKind::input, fmt::format("{} has {} rows and {} columns, but ground truth has "
-                                              "a row and a column a frame: give a square matrix.",
-                                              thing, rows, columns));
+    throw Error(ErrorKind::input,
+                fmt::format("{} has {} rows and {} columns, but ground truth has "
+                            "one row and one column per frame: give a square matrix.",
+                            thing, rows, columns));
   }
   if (rows > kMaxRows) {
     throw Error(ErrorKind::input,
@@ -35,10 +36,11 @@ TruthMatrix::TruthMatrix(const std::string& thing, Shape shape, int views)
                             thing, rows, kMaxRows));
   }
   if (rows % views_ != 0) {
-    throw Error(ErrorKind::input,
-                fmt::format("{} has {} rows, which {} views a frame do not divide: give another "
-                            "number of views.",
-                            thing, rows, views));
+    throw Error(
+        ErrorKind::input,
+        fmt::format("{} has {} rows, which is not a multiple of {} views per frame: give another "
+                    "number of views.",
+                    thing, rows, views));
   }
   places_.resize(rows / views_);
 }
@@ -58,7 +60,8 @@ std::vector<PlaceRun> TruthMatrix::runs() const {
     for (std::size_t i = 0; i < places_[query].size(); ++i) {
       for (std::uint64_t word = places_[query][i]; word != 0; word &= word - 1) {
         const auto bit = static_cast<std::size_t>(std::countr_zero(word));
-        add_place(runs, static_cast<int>(query), static_cast<int>(i * kWordBits + bit));
+        const int place = static_cast<int>(i * kWordBits + bit);
+        add_places(runs, {static_cast<int>(query), place, place});
       }
     }
   }

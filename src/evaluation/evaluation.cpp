@@ -21,7 +21,7 @@ double share(std::int64_t part, std::int64_t whole, double of_nothing) {
   return whole == 0 ? of_nothing : static_cast<double>(part) / static_cast<double>(whole);
 }
 
-/// Of each query the best-scored match, the first of equals; ordered by query.
+/// The match with the highest score of each query, the first of equal ones; ordered by query.
 std::map<int, ReportedMatch> best_by_query(const std::vector<ReportedMatch>& matches,
                                            bool accepted_only) {
   std::map<int, ReportedMatch> best;
@@ -50,7 +50,7 @@ std::int64_t count_pairs(std::vector<PlaceRun> runs) {
   return pairs;
 }
 
-/// One evaluation in the making.
+/// Accumulates one evaluation.
 class Scorer {
  public:
   Scorer(const MatchList& list, const GroundTruth& truth, const EvaluationOptions& options)
@@ -79,14 +79,14 @@ class Scorer {
   }
 
  private:
-  /// Throws where the list goes beyond the frames of which is known what is true.
+  /// Throws if the list has frames beyond those that the truth covers.
   void check_frames(const GroundTruth& truth) const {
     if (truth.frames <= 0) return;
     for (const ReportedMatch& match : list_.matches) {
       if (std::int64_t{match.query} * truth.every < truth.frames) continue;
       throw Error(ErrorKind::input,
-                  fmt::format("Query {} is beyond the {} frames that ground truth tells of: give "
-                              "that of this sequence, and which of its frames were read.",
+                  fmt::format("Query {} is beyond the {} frames of the ground truth; give the "
+                              "ground truth of this sequence, and say which frames were read.",
                               match.query, truth.frames));
     }
   }
@@ -99,7 +99,7 @@ class Scorer {
     return !is_past_end(query) && !judge_.is_ignored(query) && !elsewhere_.contains(query);
   }
 
-  /// Frames of the list where it lists them, else queries it speaks of.
+  /// The frames of the list if it lists frames, otherwise its queries.
   [[nodiscard]] int count_ignored(const GroundTruth& truth) const {
     std::set<int> ignored = elsewhere_;
     if (list_.times_s.empty()) {

@@ -14,7 +14,7 @@ namespace loopbit {
 std::span<const Protocol> protocols() {
   static const std::array kProtocols{
       Protocol{"kitti",
-               "poses: the same place within 6 m and more than 150 frames apart",
+               "poses: right within 6 m and more than 150 frames apart",
                TruthKind::poses,
                {.poses = {.radius_m = 6.0, .min_gap_frames = 150}, .variable = "", .views = 1},
                0},
@@ -29,13 +29,12 @@ std::span<const Protocol> protocols() {
                TruthKind::matrix,
                {},
                0},
-      Protocol{
-          "fab-map",
-          "loop mask with left and right images in turn: a frame is a pair of images, of which "
-          "--every 2 reads the left (Cummins and Newman 2008)",
-          TruthKind::matrix,
-          {.poses = {}, .variable = "", .views = 2},
-          0},
+      Protocol{"fab-map",
+               "loop mask with alternating left and right images: a frame is a pair of images; "
+               "--every 2 reads the left ones (Cummins and Newman 2008)",
+               TruthKind::matrix,
+               {.poses = {}, .variable = "", .views = 2},
+               0},
   };
   return kProtocols;
 }
@@ -49,7 +48,7 @@ const Protocol& find_protocol(const std::string& name) {
   for (const Protocol& protocol : all)
     names += fmt::format("\n  {:<10} {}", protocol.name, protocol.help);
   throw Error(ErrorKind::option,
-              fmt::format("There is no protocol '{}'; those there are:{}", name, names));
+              fmt::format("There is no protocol '{}'; the protocols are:{}", name, names));
 }
 
 }  // namespace loopbit

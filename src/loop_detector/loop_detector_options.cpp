@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <set>
 #include <string>
 #include <string_view>
@@ -16,6 +15,7 @@
 #include <nlohmann/json.hpp>
 
 #include "loopbit/error.hpp"
+#include "loopbit/read_file.hpp"
 
 namespace loopbit {
 namespace {
@@ -167,22 +167,7 @@ LoopDetectorOptions options_from_json(const std::string& json, const std::string
 }
 
 LoopDetectorOptions load_options(const std::string& path) {
-  std::ifstream file(path);
-  std::string text(kMaxBytes + 1, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(file.gcount()));
-  if (text.size() > kMaxBytes) {
-    throw Error(ErrorKind::input,
-                fmt::format("The settings file '{}' has more than {} bytes; name "
-                            "one that 'loopbit options --json' could have written.",
-                            path, kMaxBytes));
-  }
-  if (!file.is_open() || file.bad()) {
-    throw Error(
-        ErrorKind::input,
-        fmt::format("Cannot read the settings file '{}'; check its name and permissions.", path));
-  }
-  return options_from_json(text, path);
+  return options_from_json(read_text(path, kMaxBytes), path);
 }
 
 std::vector<OptionInfo> list_options() {

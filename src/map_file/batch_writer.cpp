@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "map_log.hpp"
 #include "map_schema.hpp"
 
 namespace loopbit {
@@ -32,7 +33,6 @@ MapLoop loop_of(const Detection& detection, int session) {
 BatchWriter::BatchWriter(Database database, MapSession session, std::int64_t first_place,
                          EncodeImage encode_image)
     : database_(std::move(database)),
-      rows_(database_),
       session_(std::move(session)),
       first_place_(first_place),
       encode_image_(std::move(encode_image)),
@@ -78,7 +78,11 @@ std::int64_t BatchWriter::saved_frames() const {
   return saved_frames_;
 }
 
-void BatchWriter::close_log() { loopbit::close_log(database_); }
+void BatchWriter::close() {
+  rows_.reset();
+  close_log(*database_);
+  database_.reset();
+}
 
 void BatchWriter::commit_batches() {
   std::unique_lock lock(mutex_);
@@ -110,11 +114,12 @@ void BatchWriter::commit_batches() {
 }
 
 void BatchWriter::commit(const std::vector<AddedFrame>& batch) {
-  database_.execute("BEGIN IMMEDIATE");
+  begin_commit(*database_);
+  if (!rows_) rows_.emplace(*database_);
   session_.frames = batch.back().detection.frame + 1;
-  rows_.write(session_);
+  rows_->write(session_);
   for (const AddedFrame& frame : batch) write(frame);
-  database_.execute("COMMIT");
+  database_->execute("COMMIT");
 }
 
 void BatchWriter::write(const AddedFrame& frame) {
@@ -125,9 +130,9 @@ void BatchWriter::write(const AddedFrame& frame) {
                        .at = {session_.session, detection.frame},
                        .timestamp_s = has_time ? detection.timestamp_s : std::nullopt,
                        .content = frame.content};
-  rows_.write(place, *frame.features);
-  if (!frame.image.empty()) rows_.write_image(place, encode_image_(frame.image));
-  if (detection.status == Status::loop) rows_.write(loop_of(detection, session_.session));
+  rows_->write(place, *frame.features);
+  if (!frame.image.empty()) rows_->write_image(place, encode_image_(frame.image));
+  if (detection.status == Status::loop) rows_->write(loop_of(detection, session_.session));
 }
 
 }  // namespace loopbit

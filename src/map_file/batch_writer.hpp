@@ -8,6 +8,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <vector>
 
@@ -51,17 +52,18 @@ class BatchWriter {
 
   [[nodiscard]] std::int64_t saved_frames() const;
 
-  /// After flush(): leaves one file without a log beside it, if no reader holds the log.
-  void close_log();
+  /// After flush(), and once: gives up the right to write, and leaves one file without a log beside
+  /// it, if no reader holds the log.
+  void close();
 
  private:
   void commit_batches();
   void commit(const std::vector<AddedFrame>& batch);
   void write(const AddedFrame& frame);
 
-  Database database_;
-  RowWriter rows_;
-  MapSession session_;  ///< session_.frames are committed; for the thread only
+  std::optional<Database> database_;
+  std::optional<RowWriter> rows_;  ///< from the first commit on: an older map lacks tables
+  MapSession session_;             ///< session_.frames are committed; for the thread only
   std::int64_t first_place_;
   EncodeImage encode_image_;
 

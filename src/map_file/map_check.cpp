@@ -4,6 +4,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -14,14 +15,15 @@
 #include <utility>
 #include <vector>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
 #include "loopbit/map_tools.hpp"
 
 #include "map_copy.hpp"
+#include "map_log.hpp"
 #include "map_schema.hpp"
-#include "writer_lock.hpp"
 
 namespace loopbit {
 namespace {
@@ -130,6 +132,19 @@ bool can_be_opened(const std::string& path) {
   }
 }
 
+Error is_there(const std::string& path) {
+  return {ErrorKind::output, fmt::format("'{}' exists; name a new file to recover to.", path)};
+}
+
+/// Throws Error (kind output) where there is a file by now.
+void rename_to_new(const std::string& from, const std::string& to) {
+  int failed = renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE);
+  // Not every file system can tell.
+  if (failed != 0 && errno == EINVAL) failed = rename(from.c_str(), to.c_str());
+  if (failed == 0) return;
+  throw errno == EEXIST ? is_there(to) : cannot_write(to, errno);
+}
+
 MapCheck recover_to_new(const std::string& from, const std::string& to) {
   std::error_code error;
   const bool has_page = fs::file_size(from, error) >= kMapPageBytes && !error;
@@ -183,20 +198,20 @@ MapCheck check_map(const std::string& path) {
 }
 
 MapCheck recover_map(const std::string& from, const std::string& to) {
-  const WriterLock lock(to);
   std::error_code error;
-  if (fs::exists(to, error)) {
-    throw Error(ErrorKind::output, fmt::format("'{}' exists; name a new file to recover to.", to));
-  }
+  if (fs::exists(to, error)) throw is_there(to);
   // Under its name there is only a whole one, whenever this is killed.
   const std::string part = to + ".part";
+  if (fs::exists(part, error) && is_being_written(part)) {
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' is being recovered by another run; wait until that ends.", to));
+  }
   remove_database(part);
   remove_database(to);  // a log of a map that was there
   try {
     MapCheck check = recover_to_new(from, part);
     if (check.sessions > 0 || check.damage.empty()) {
-      fs::rename(part, to, error);
-      if (error) throw cannot_write(to, error.value());
+      rename_to_new(part, to);
       return check;
     }
     throw Error(ErrorKind::input, fmt::format("Nothing of '{}' can be recovered: it is no map of "

@@ -18,9 +18,9 @@
 #include "loopbit/write_file.hpp"
 
 #include "map_copy.hpp"
+#include "map_log.hpp"
 #include "map_schema.hpp"
 #include "thinning.hpp"
-#include "writer_lock.hpp"
 
 namespace loopbit {
 namespace {
@@ -102,18 +102,17 @@ void make_alike(const std::string& part, const std::string& path) {
   if (!is_alike) throw cannot_write(part, reason);
 }
 
-/// Writes what remains of the map at `path` to the new file `part`.
-void write_compact(const std::string& path, const std::string& part, const CompactOptions& options,
+/// Writes what remains of the map `old` to the new file `part`.
+void write_compact(const Database& old, const std::string& part, const CompactOptions& options,
                    CompactCounts& counts) {
-  MapReader map(path);
+  MapReader map(old.path());
   CopyPlan plan{.sessions = sessions_but(map, options.drop_sessions),
                 .keeps_place = {},
                 .keeps_images = !options.drop_images};
   const auto kept = remaining(map, options);
   plan.keeps_place = [&](const MapPlace& place) { return kept.contains(place.id); };
   map.for_each_place([&](const MapPlace&) { ++counts.places_before; });
-  const Database old = open_map_for_reading(path);
-  make_alike(part, path);
+  make_alike(part, old.path());
   const Database compact = open_map_for_writing(part);
   counts.places_after = copy_whole(map, plan, compact).places;
   refuse_damaged(map.path(), map.damage());
@@ -122,26 +121,28 @@ void write_compact(const std::string& path, const std::string& part, const Compa
 }
 
 /// The log of the old file would be taken for the new one's.
-void check_unused(const std::string& path) {
-  const Database old = open_map_for_writing(path);
-  if (close_log(old)) return;
-  throw Error(ErrorKind::output,
-              fmt::format("'{}' is being read by another process; end that, then compact again. "
-                          "Nothing was changed.",
-                          path));
+void check_unused(const Database& old) {
+  if (!close_log(old)) {
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' is being read by another process; end that, then compact again. "
+                            "Nothing was changed.",
+                            old.path()));
+  }
+  old.execute("BEGIN EXCLUSIVE; ROLLBACK");
 }
 
 }  // namespace
 
 CompactCounts compact_map(const std::string& path, const CompactOptions& options) {
-  const WriterLock lock(path);
+  (void)open_map_for_reading(path);  // or one would be made
+  const Database old = open_map_for_writing(path);
   const std::string file = resolved_path(path);
   const std::string part = file + ".compact";
   remove_database(part);
   CompactCounts counts;
   try {
-    write_compact(path, part, options, counts);
-    check_unused(path);
+    write_compact(old, part, options, counts);
+    check_unused(old);
     std::error_code error;
     counts.bytes_before = fs::file_size(file, error);
     if (!error) counts.bytes_after = fs::file_size(part, error);

@@ -4,6 +4,8 @@
 
 #include <utility>
 
+#include "map_schema.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -45,7 +47,7 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
   for (const MapSession& session : plan.sessions) numbers[session.session] = session.session;
   MapCopy copy(to, std::move(numbers));
   MapCheck counts;
-  to.execute("BEGIN IMMEDIATE");
+  begin_commit(to);
   for (const MapSession& session : plan.sessions) copy.copy_session(session);
   counts.sessions = static_cast<std::int64_t>(plan.sessions.size());
   from.for_each_place([&](const MapPlace& place) {
@@ -54,7 +56,10 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
     const Image image = plan.keeps_images ? from.image_of(place) : std::nullopt;
     if (!features || !copy.copy_place(place, *features, image)) return;
     counts.images += image.has_value();
-    if (++counts.places % kPlacesPerTransaction == 0) to.execute("COMMIT; BEGIN IMMEDIATE");
+    if (++counts.places % kPlacesPerTransaction == 0) {
+      to.execute("COMMIT");
+      begin_commit(to);
+    }
   });
   for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);
   to.execute("COMMIT");

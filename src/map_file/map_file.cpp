@@ -3,13 +3,13 @@
 #include "loopbit/map_file.hpp"
 
 #include <ctime>
-#include <filesystem>
 #include <new>
 #include <random>
 #include <utility>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "loopbit/database.hpp"
 #include "loopbit/error.hpp"
@@ -17,11 +17,11 @@
 #include "loopbit/version.hpp"
 
 #include "batch_writer.hpp"
+#include "map_log.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
 #include "map_schema.hpp"
 #include "stored_features.hpp"
-#include "writer_lock.hpp"
 
 namespace loopbit {
 namespace {
@@ -41,13 +41,15 @@ std::string now_utc() {
 }  // namespace
 
 struct MapReader::Impl {
-  explicit Impl(const std::string& map_path)
+  Impl(const std::string& map_path, std::size_t cache_mb)
       : path(map_path),
         database(open_map_for_reading(map_path)),
         features(database),
         images(database),
-        stored(database),
-        sessions(read_sessions(database, damage)) {}
+        stored(database, cache_mb),
+        sessions(read_sessions(database, damage)) {
+    if (const std::string fault = header_fault(database); !fault.empty()) damage.add(fault);
+  }
 
   std::string path;
   Database database;
@@ -58,7 +60,8 @@ struct MapReader::Impl {
   std::vector<MapSession> sessions;
 };
 
-MapReader::MapReader(const std::string& path) : impl_(std::make_unique<Impl>(path)) {}
+MapReader::MapReader(const std::string& path, std::size_t cache_mb)
+    : impl_(std::make_unique<Impl>(path, cache_mb)) {}
 MapReader::~MapReader() = default;
 
 const std::vector<MapSession>& MapReader::sessions() const { return impl_->sessions; }
@@ -142,20 +145,31 @@ void MapReader::add(const Detection& /*detection*/, const BinaryContent& /*conte
 class MapWriter::Impl {
  public:
   Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
-       EncodeImage encode_image)
-      : lock_(std::in_place, path),
-        path_(path),
+       EncodeImage encode_image, std::size_t cache_mb)
+      : path_(path),
         options_(options),
         keeps_images_(encode_image != nullptr),
-        writer_(begin_session(name, std::move(encode_image))) {}
+        writer_(begin_session(name, std::move(encode_image), cache_mb)) {}
 
   void finish() {
-    if (!lock_) return;
+    if (!stored_) return;
     writer_->flush();
     stored_.reset();
     database_.reset();
-    writer_->close_log();
-    lock_.reset();
+    writer_->close();
+  }
+
+  /// Whether this process has only a copy of it, without its thread.
+  [[nodiscard]] bool is_forked() const { return getpid() != process_; }
+
+  /// Throws Error (kind option) in a forked child.
+  void check_process() const {
+    if (!is_forked()) return;
+    throw Error(
+        ErrorKind::option,
+        fmt::format("The MapWriter of '{}' belongs to process {}, which forked this one. Use "
+                    "it there, or fork before you open the map.",
+                    path_, process_));
   }
 
   void check_options(const LoopDetectorOptions& options) {
@@ -212,11 +226,14 @@ class MapWriter::Impl {
   [[nodiscard]] BatchWriter& writer() const { return *writer_; }
 
  private:
-  std::unique_ptr<BatchWriter> begin_session(const std::string& name, EncodeImage encode_image) {
-    check_map_is_of_this_shape();
+  std::unique_ptr<BatchWriter> begin_session(const std::string& name, EncodeImage encode_image,
+                                             std::size_t cache_mb) {
     Database database = open_map_for_writing(path_);
+    for (const MapSession& session : read_sessions(database, damage_)) {
+      check_same_shape(path_, session.options, options_);
+    }
     database_.emplace(open_map_for_reading(path_));
-    stored_.emplace(*database_);
+    stored_.emplace(*database_, cache_mb);
     session_ = next_session(database);
     first_place_ = next_place(database);
     MapSession session{.session = session_,
@@ -227,22 +244,6 @@ class MapWriter::Impl {
                        .options = to_json(options_)};
     return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_,
                                          std::move(encode_image));
-  }
-
-  /// Throws Error (kind option) if the map, where there is one, has places of other settings:
-  /// before it is opened for writing, which changes the file. Why it cannot be read, opening tells
-  /// then.
-  void check_map_is_of_this_shape() {
-    std::error_code error;
-    const auto bytes = std::filesystem::file_size(path_, error);
-    if (error || bytes == 0) return;
-    std::vector<MapSession> sessions;
-    try {
-      sessions = read_sessions(open_map_for_reading(path_), damage_);
-    } catch (const Error&) {
-      return;
-    }
-    for (const MapSession& session : sessions) check_same_shape(path_, session.options, options_);
   }
 
   /// Throws Error (kind option) after finish().
@@ -258,7 +259,7 @@ class MapWriter::Impl {
 
   [[nodiscard]] PlaceId session_begin() { return stored().size() - frames_; }
 
-  std::optional<WriterLock> lock_;  ///< gone after finish(): others may write
+  pid_t process_ = getpid();
   std::string path_;
   LoopDetectorOptions options_;  ///< of the session
   bool keeps_images_;
@@ -272,36 +273,46 @@ class MapWriter::Impl {
 };
 
 MapWriter::MapWriter(const std::string& path, const LoopDetectorOptions& options,
-                     const std::string& name, EncodeImage encode_image)
-    : impl_(std::make_unique<Impl>(path, options, name, std::move(encode_image))) {}
+                     const std::string& name, EncodeImage encode_image, std::size_t cache_mb)
+    : impl_(std::make_unique<Impl>(path, options, name, std::move(encode_image), cache_mb)) {}
 
 MapWriter::~MapWriter() {
+  if (impl_->is_forked()) {
+    (void)impl_.release();  // its thread, its locks and its SQLite are the parent's
+    return;
+  }
   try {
     impl_->finish();
   } catch (...) {  // told by finish(), to those who ask
   }
 }
 
-int MapWriter::session() const { return impl_->session(); }
-std::int64_t MapWriter::saved_frames() const { return impl_->writer().saved_frames(); }
-void MapWriter::flush() { impl_->writer().flush(); }
-void MapWriter::finish() { impl_->finish(); }
-const std::vector<std::string>& MapWriter::damage() const { return impl_->damage().clauses(); }
+MapWriter::Impl& MapWriter::impl() const {
+  impl_->check_process();
+  return *impl_;
+}
 
-void MapWriter::check_options(const LoopDetectorOptions& options) { impl_->check_options(options); }
+void MapWriter::check_process() const { impl_->check_process(); }
+int MapWriter::session() const { return impl().session(); }
+std::int64_t MapWriter::saved_frames() const { return impl().writer().saved_frames(); }
+void MapWriter::flush() { impl().writer().flush(); }
+void MapWriter::finish() { impl().finish(); }
+const std::vector<std::string>& MapWriter::damage() const { return impl().damage().clauses(); }
 
-void MapWriter::for_each_earlier_place(const Visit& visit) { impl_->for_each_earlier_place(visit); }
+void MapWriter::check_options(const LoopDetectorOptions& options) { impl().check_options(options); }
+
+void MapWriter::for_each_earlier_place(const Visit& visit) { impl().for_each_earlier_place(visit); }
 void MapWriter::for_each_earlier_loop(const VisitLoop& visit) {
-  impl_->for_each_earlier_loop(visit);
+  impl().for_each_earlier_loop(visit);
 }
 
 std::shared_ptr<const Features> MapWriter::features(PlaceId place) {
-  return impl_->features(place);
+  return impl().features(place);
 }
 
 void MapWriter::add(const Detection& detection, const BinaryContent& content,
                     std::shared_ptr<const Features> features, const cv::Mat& image) {
-  impl_->add(detection, content, std::move(features), image);
+  impl().add(detection, content, std::move(features), image);
 }
 
 }  // namespace loopbit

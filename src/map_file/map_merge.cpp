@@ -12,9 +12,9 @@
 #include "loopbit/map_tools.hpp"
 
 #include "map_copy.hpp"
+#include "map_log.hpp"
 #include "map_options.hpp"
 #include "map_schema.hpp"
-#include "writer_lock.hpp"
 
 namespace loopbit {
 namespace {
@@ -76,10 +76,10 @@ MergeCounts merge(const std::string& into, const Database& to, MapReader& source
   for (const MapSession& session : plan.added) added.insert(session.session);
 
   MergeCounts counts{.sessions = static_cast<std::int64_t>(added.size()), .known = plan.known};
-  MapCopy copy(to, plan.numbers);
-  std::int64_t id = next_place(to);
-  to.execute("BEGIN IMMEDIATE");
+  begin_commit(to);
   try {
+    MapCopy copy(to, plan.numbers);
+    std::int64_t id = next_place(to);
     for (const MapSession& session : plan.added) copy.copy_session(session);
     source.for_each_place([&](const MapPlace& place) {
       if (!added.contains(place.at.session)) return;
@@ -106,7 +106,6 @@ MergeCounts merge(const std::string& into, const Database& to, MapReader& source
 MergeCounts merge_map(const std::string& into, const std::string& from) {
   auto source = std::make_unique<MapReader>(from);
   refuse_unfinished(from);
-  const WriterLock lock(into);
   const Database to = open_map_for_writing(into);
   try {
     const MergeCounts counts = merge(into, to, *source);

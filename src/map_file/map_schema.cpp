@@ -4,12 +4,19 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <filesystem>
 #include <system_error>
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/write_file.hpp"
+
+#include "map_log.hpp"
+#include "map_rows.hpp"
 
 namespace loopbit {
 namespace {
@@ -124,6 +131,34 @@ void migrate(const Database& database, int from, int to) {
                                kMapApplicationId, to));
 }
 
+/// Opens a file, made if there is none, with the right to write it.
+Database lock_map(const std::string& path) {
+  while (true) {
+    Database database(path, Database::Access::create, remedies(path));
+    const bool is_locked = database.file().lock();
+    if (!database.file().is_at_its_path()) continue;  // it was compacted just now
+    if (is_locked) return database;
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' is being written by another run; wait until that ends, or name "
+                            "another map. Reading it is possible all the time.",
+                            path));
+  }
+}
+
+/// Throws Error (kind output) where a log would be missed or cannot be made.
+void check_may_be_written(const std::string& path) {
+  if (const std::string reason = other_name(path); !reason.empty()) {
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' {}, and the log of a run would be beside one name only. Copy the "
+                            "map to a file of its own, or mount its folder, and use that.",
+                            path, reason));
+  }
+  const auto folder = std::filesystem::path(resolved_path(path)).parent_path();
+  if (faccessat(AT_FDCWD, folder.c_str(), W_OK | X_OK, AT_EACCESS) != 0) {
+    throw cannot_write(path, errno);
+  }
+}
+
 }  // namespace
 
 bool has_images(const Database& database) {
@@ -131,34 +166,42 @@ bool has_images(const Database& database) {
 }
 
 Database open_map_for_writing(const std::string& path, int version) {
-  Database database(path, Database::Access::create, remedies(path));
-  database.execute(fmt::format("PRAGMA page_size = {}", kMapPageBytes));
+  Database database = lock_map(path);
+  if (const std::string fault = header_fault(database); !fault.empty()) {
+    refuse_damaged(path, {fault});
+  }
+  check_may_be_written(path);
+  check_log(database);
+  // Each commit is on disk when it returns (sqlite.org/wal.html, "Performance Considerations").
+  // With EXTRA that also holds for the mark of a log, which is committed before the log begins.
+  database.execute(fmt::format("PRAGMA page_size = {}; PRAGMA synchronous = EXTRA", kMapPageBytes));
   const int found = checked_version(database);
   if (found > 0) check_tables(database, found);
-  migrate(database, found, version);
-  // Each commit is on disk when it returns (sqlite.org/wal.html, "Performance Considerations").
-  database.execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL");
+  close_log(database);  // of a run that was killed
+  // Throws if nothing can be written, or if a long read would keep the log from beginning.
+  database.execute("BEGIN EXCLUSIVE; ROLLBACK");
+  if (found == 0) migrate(database, found, version);
   return database;
 }
 
-bool close_log(const Database& database) {
-  try {
-    database.execute("PRAGMA busy_timeout = 0");
-    Statement mode(database, "PRAGMA journal_mode = DELETE");
-    if (mode.step() && mode.text(0) == "delete") return true;
-  } catch (const Error&) {  // it is locked
+void begin_commit(const Database& database) {
+  const bool is_logged = has_log(database);
+  migrate(database, static_cast<int>(database.integer("PRAGMA user_version")), kMapVersion);
+  // Writes the first page, see map_log.hpp.
+  const std::string touch = fmt::format("PRAGMA user_version = {}", kMapVersion);
+  if (!is_logged) {
+    begin_log(database);
+    database.execute(touch);  // so that it comes first, and is soon found
   }
-  try {
-    // The log stays, but a copy of the file alone has all that no reader is in the midst of.
-    database.execute("PRAGMA wal_checkpoint(FULL)");
-  } catch (const Error&) {
-  }
-  return false;
+  database.execute("BEGIN IMMEDIATE; " + touch);
 }
+
+bool is_being_written(const std::string& path) { return OpenFile(path).is_locked(); }
 
 Database open_map_for_reading(const std::string& path) {
   check_is_file(path);
   Database database(path, Database::Access::read, remedies(path));
+  check_log(database);
   const int version = checked_version(database);
   if (version == 0) refuse(database, "is empty; 'loopbit run INPUT --map' fills it");
   check_tables(database, version);
@@ -168,6 +211,7 @@ Database open_map_for_reading(const std::string& path) {
 bool is_newer_map(const std::string& path) {
   check_is_file(path);
   const Database database(path, Database::Access::read, remedies(path));
+  check_log(database);
   Statement id(database, "PRAGMA application_id");
   return id.step_if_readable() == Statement::Step::row && id.integer(0) == kMapApplicationId &&
          database.integer("PRAGMA user_version") > kMapVersion;

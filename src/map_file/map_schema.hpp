@@ -18,24 +18,30 @@ inline constexpr int kFirstVersionWithImages = 2;
 /// Large pages: features take 48 KB a place, contents are read one after the other.
 inline constexpr int kMapPageBytes = 16384;
 
-/// Opens a map to be written, made if there is none or an empty file, and brought to kMapVersion.
-/// What is committed survives the loss of power. Throws Error (kind input) if the file is no map,
-/// of a newer version or damaged where its tables are listed, (kind output) if it cannot be
-/// written. `version`: of a map that is made, to repair an older one by.
+/// Opens a map to be written, made if there is none or an empty file: with the right to write it,
+/// which the database keeps, and without writing to it, but for what a killed run left in its log.
+/// Throws Error (kind input) if the file is no map, of a newer version or damaged where its tables
+/// are listed, (kind output) if it has a writer or cannot be written. `version`: of a map that is
+/// made, to repair an older one by.
 Database open_map_for_writing(const std::string& path, int version = kMapVersion);
+
+/// Begins a transaction of a map that is open to be written, which is brought to kMapVersion. What
+/// is committed survives the loss of power, and is seen by readers.
+void begin_commit(const Database& database);
+
+/// Whether this process or another has the map open to be written. Throws Error (kind input) if
+/// there is none.
+bool is_being_written(const std::string& path);
 
 /// Whether the map's version has a table of images.
 bool has_images(const Database& database);
 
-/// Leaves one file without a log beside it. False if others have the map open: the log remains, and
-/// is part of the map.
-bool close_log(const Database& database);
-
-/// Opens a map to be read, beside a writer or without. Throws as above, kind input.
+/// Opens a map to be read, beside a writer or without. Throws Error (kind input) as above.
 Database open_map_for_reading(const std::string& path);
 
 /// Whether the map is of a newer version; not if its first page is damaged. Throws Error (kind
-/// input) if there is no file, it may not be read or another program holds it.
+/// input) if there is no file, it may not be read, another program holds it or its log is not its
+/// own.
 bool is_newer_map(const std::string& path);
 
 }  // namespace loopbit

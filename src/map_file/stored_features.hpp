@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -14,12 +15,11 @@
 
 namespace loopbit {
 
-/// The features of a map's places by the number a detector knows them by; those used last are kept,
-/// see kFeatureCacheBytes.
+/// The features of a map's places by the number a detector knows them by; those used last are kept.
 class StoredFeatures {
  public:
-  explicit StoredFeatures(const Database& database)
-      : reader_(database), cache_(kFeatureCacheBytes) {}
+  StoredFeatures(const Database& database, std::size_t cache_mb)
+      : reader_(database), cache_(cache_mb << 20U) {}
 
   /// To be called before add(). Throws Error (kind option) the second time: the places of the map
   /// at `path` are numbered for one detector.

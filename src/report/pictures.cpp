@@ -20,8 +20,8 @@ std::string base64_of(std::span<const T> values) {
   return base64({reinterpret_cast<const unsigned char*>(values.data()), values.size_bytes()});
 }
 
-/// 0 to n - 1, ordered by their bits read backwards, so that every beginning of the list is spread
-/// evenly (van der Corput 1935).
+/// 0 to n - 1 in bit-reversed order, so that every prefix of the list is spread evenly (van der
+/// Corput 1935).
 std::vector<std::size_t> spread_order(std::size_t n) {
   const auto reversed = [](std::uint32_t x) {
     std::uint32_t y = 0;
@@ -36,7 +36,7 @@ std::vector<std::size_t> spread_order(std::size_t n) {
   return order;
 }
 
-/// The frames in the order in which they earn a picture.
+/// The frames in order of priority for a picture.
 std::vector<const FrameView*> by_turns(const std::vector<FrameView>& frames) {
   std::map<std::string, std::vector<const FrameView*>> groups;
   for (const FrameView& view : frames) groups[view.verdict].push_back(&view);

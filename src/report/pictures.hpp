@@ -12,15 +12,15 @@
 
 namespace loopbit::report {
 
-/// What a frame turned out to be; web/src/report_data.ts lists the words.
+/// The verdict of a frame; web/src/report_data.ts lists the names.
 struct FrameView {
   int frame = 0;
   std::string verdict;
   std::vector<int> partners;  ///< frames shown beside it: its match, a true place
 };
 
-/// Pictures by frame number, as many as fit into `max_bytes` of JSON: of each verdict in turn, and
-/// of each evenly along the run, a frame together with its partners.
+/// Pictures by frame number, as many as fit into `max_bytes` of JSON. Verdicts take turns; within a
+/// verdict frames are spread evenly over the run. A frame comes together with its partners.
 nlohmann::ordered_json pictures(const std::vector<FrameView>& frames,
                                 const EvidenceReader& evidence, std::size_t max_bytes);
 

@@ -41,7 +41,8 @@ std::int64_t listed_frames(const ReportRun& run) {
   return static_cast<std::int64_t>(run.list.times_s.size());
 }
 
-/// As many as there must be for all that is said about them. `truth`: in their numbers.
+/// The smallest number of frames that contains everything reported. `truth` is in frames of the
+/// run.
 std::int64_t least_frames(const MatchList& list, const std::optional<GroundTruth>& truth) {
   int last = -1;
   for (const ReportedMatch& match : list.matches) last = std::max({last, match.query, match.match});
@@ -54,18 +55,18 @@ std::int64_t least_frames(const MatchList& list, const std::optional<GroundTruth
   return std::int64_t{last} + 1;
 }
 
-/// Throws Error (kind input) where a page could not show so many.
+/// Throws Error (kind input) if a page cannot show that many.
 int checked(std::int64_t frames, const std::string& name) {
   constexpr std::int64_t kMaxFrames = 2'000'000;
   if (frames <= kMaxFrames) return static_cast<int>(frames);
   throw Error(ErrorKind::input,
-              fmt::format("'{}' tells of {} frames, but a page shows at most {}; leave out frames, "
+              fmt::format("'{}' has {} frames, but a page shows at most {}; leave out frames, "
                           "or use 'loopbit eval', which needs none.",
                           name, frames, kMaxFrames));
 }
 
-/// Where a detector lists none, those of the other runs, which are about the same images, or as
-/// many as there are positions.
+/// If a detector lists no frames, uses those of the other runs on the same images, or the number of
+/// positions.
 FrameCount frame_count(const ReportRun& run, const std::optional<GroundTruth>& truth,
                        const std::vector<ReportRun>& runs) {
   if (const std::int64_t listed = listed_frames(run); listed > 0) {
@@ -77,7 +78,7 @@ FrameCount frame_count(const ReportRun& run, const std::optional<GroundTruth>& t
   return {checked(std::max(known, least), run.name), known > 0 && known >= least};
 }
 
-/// Of each frame the match that speaks for it: accepted before rejected, then by score.
+/// The match that counts for each frame: accepted before rejected, then by score.
 std::vector<const ReportedMatch*> best_matches(const MatchList& list, int frames) {
   std::vector<const ReportedMatch*> best(static_cast<std::size_t>(frames));
   for (const ReportedMatch& match : list.matches) {
@@ -90,7 +91,7 @@ std::vector<const ReportedMatch*> best_matches(const MatchList& list, int frames
   return best;
 }
 
-/// Which frames have an accepted match that is none of this run's frames.
+/// The frames whose accepted match is not a frame of this run.
 std::vector<bool> loops_elsewhere(const MatchList& list, int frames) {
   std::vector<bool> elsewhere(static_cast<std::size_t>(frames));
   for (const int query : list.elsewhere) {
@@ -112,7 +113,7 @@ std::string verdict_of(int frame, const ReportedMatch* match, bool is_elsewhere,
   return judgement == Judgement::tolerated ? "tolerated" : "none";
 }
 
-/// Of each query the true place that stands for all: the middle of its first run.
+/// One true place per query: the middle of its first run.
 std::unordered_map<int, int> true_places(const std::optional<GroundTruth>& truth) {
   std::unordered_map<int, int> places;
   if (!truth) return places;
@@ -122,7 +123,7 @@ std::unordered_map<int, int> true_places(const std::optional<GroundTruth>& truth
   return places;
 }
 
-/// `truth`: in the numbers of the run's frames.
+/// `truth` is in frames of the run.
 std::vector<FrameView> frame_views(const ReportRun& run, const std::optional<GroundTruth>& truth,
                                    int frames) {
   const auto judge =
@@ -176,7 +177,7 @@ Json earlier_matches(const std::vector<Detection>& detections) {
   });
 }
 
-/// The columns that loops.csv has and other detectors' lists have not.
+/// The columns of loops.csv that lists of other detectors lack.
 void add_own_columns(Json& json, const std::vector<Detection>& detections) {
   const auto time = [&](double StepTimes::*step) {
     return column(detections, [&](const Detection& d) { return d.times.*step; });
@@ -221,7 +222,7 @@ void add_match_columns(Json& json, const MatchList& list, int frames) {
   }
 }
 
-/// The two axes of the world along which the positions reach furthest.
+/// The two axes with the largest extent of the positions.
 std::array<int, 2> plane(const std::vector<std::optional<cv::Vec3d>>& positions_m) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::array<double, 3> low{kInfinity, kInfinity, kInfinity};
@@ -256,7 +257,7 @@ Json positions(std::vector<std::optional<cv::Vec3d>> positions_m, int frames) {
   return {{"x_m", x}, {"y_m", y}, {"axes", {axis_name(across), axis_name(along)}}};
 }
 
-/// With every frame's own match, which is to be seen whatever else is left out.
+/// Always includes the match of every frame, even if other pairs are left out.
 Json matrix_json(const EvidenceReader& evidence, const MatchList& list, int frames,
                  int shift_tolerance_columns) {
   std::vector<BinaryContent> contents(static_cast<std::size_t>(frames));
@@ -273,14 +274,15 @@ Json matrix_json(const EvidenceReader& evidence, const MatchList& list, int fram
           {"png", report::base64(png)}};
 }
 
-/// The record, or null where the run was cut off.
+/// The record, or null if the run was cut off.
 Json record_of(const ReportRun& run) {
   if (!run.run || run.run->record_json.empty()) return nullptr;
   Json record = Json::parse(run.run->record_json, nullptr, false);
   if (!record.is_object() || !record.contains("options")) {
-    throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is no record of a run: it was "
-                                              "changed after loopbit wrote it; run again.",
-                                              run.run->path));
+    throw Error(ErrorKind::input,
+                fmt::format("The run.json in '{}' is not a record of a run: it was "
+                            "changed after loopbit wrote it; run again.",
+                            run.run->path));
   }
   return record;
 }
@@ -290,7 +292,7 @@ bool is_same(const GroundTruth& a, const GroundTruth& b) {
          a.ignored == b.ignored && a.unknown == b.unknown;
 }
 
-/// What truth is, in the words of the run that it was given to; null where none has any.
+/// The description of the truth in the run that was given it; null if no run has one.
 Json source_of(const GroundTruth& truth, const std::vector<ReportRun>& runs) {
   for (const ReportRun& run : runs) {
     if (!run.run || !run.run->truth || !is_same(truth, *run.run->truth)) continue;
@@ -367,7 +369,7 @@ std::string report_json(const std::vector<ReportRun>& runs, const ReportOptions&
 void write_report(const std::string& path, const std::vector<ReportRun>& runs,
                   const ReportOptions& options) {
   std::string json = report_json(runs, options);
-  // Nothing in the data may end the element that holds it.
+  // The data must not close the HTML element that contains it.
   replace_all(json, "<", "\\u003c");
   std::string page(report::kPage);
   page.replace(page.find(kDataPlace), kDataPlace.size(), json);

@@ -6,7 +6,7 @@
 
 namespace loopbit::report {
 
-/// The page as the build made it from web/, with a place for its data.
+/// report.html, with a place for its data.
 extern const std::string_view kPage;
 
 }  // namespace loopbit::report

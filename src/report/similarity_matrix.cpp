@@ -15,19 +15,19 @@ constexpr int kMaxFrames = 2048;
 
 int divided_up(int whole, int parts) { return (whole + parts - 1) / parts; }
 
-/// A xi as the matrix keeps it.
+/// Quantises a xi for the matrix.
 std::uint8_t level(double similarity) {
   return static_cast<std::uint8_t>(std::lround(255.0 * similarity));
 }
 
-/// Makes the cell of two frames as large as their xi.
+/// Raises the cell of two frames to their xi.
 void raise(SimilarityMatrix& matrix, int later, int earlier, std::uint8_t level) {
   std::uint8_t& cell =
       matrix.cells(later / matrix.frames_per_cell, earlier / matrix.frames_per_cell);
   cell = std::max(cell, level);
 }
 
-/// Every `matrix.compared_every`-th frame with all such before it.
+/// Compares every `matrix.compared_every`-th frame with all earlier such frames.
 void compare_evenly(SimilarityMatrix& matrix, const std::vector<BinaryContent>& contents,
                     int shift_tolerance_columns) {
   const int step = matrix.compared_every;

@@ -11,16 +11,16 @@
 
 namespace loopbit::report {
 
-/// xi of two frames each, for the eye.
+/// xi of pairs of frames, for display.
 struct SimilarityMatrix {
   int frames_per_cell = 1;
   int compared_every = 1;  ///< every so-many-th frame was compared with every so-many-th
   cv::Mat1b cells;         ///< square; row = later frame, column = earlier; 255 = xi of 1
 };
 
-/// The largest xi in each cell of a matrix of at most 640 cells a side. Of more than 2,048 frames
-/// at most so many are compared, evenly spaced, and all that `matches` names, each with its match.
-/// Deterministic on every processor.
+/// The largest xi in each cell of a matrix of at most 640 x 640 cells. At most 2,048 evenly spaced
+/// frames are compared, and every frame of `matches` with its match. Deterministic on every
+/// processor.
 SimilarityMatrix similarity_matrix(const std::vector<BinaryContent>& contents,
                                    const std::vector<ReportedMatch>& matches,
                                    int shift_tolerance_columns);

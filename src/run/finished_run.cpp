@@ -6,10 +6,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string_view>
 #include <type_traits>
 
@@ -17,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include "loopbit/error.hpp"
+#include "loopbit/read_file.hpp"
 #include "loopbit/run_folder.hpp"
 
 #include "run_files.hpp"
@@ -25,25 +23,6 @@ namespace loopbit {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::uintmax_t kMaxBytes = std::uintmax_t{1} << 30U;
-
-std::string read_text(const fs::path& path) {
-  std::error_code error;
-  if (const auto bytes = fs::file_size(path, error); !error && bytes > kMaxBytes) {
-    throw Error(ErrorKind::input, fmt::format("'{}' has {} bytes, but at most {} are read: it was "
-                                              "not written by loopbit.",
-                                              path.string(), bytes, kMaxBytes));
-  }
-  std::ifstream file(path, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(file), {}};
-  if (file.bad() || !file.is_open()) {
-    throw Error(ErrorKind::input, fmt::format("'{}' cannot be read: check that it exists and its "
-                                              "permissions.",
-                                              path.string()));
-  }
-  return text;
-}
 
 /// The cells of one line of a file of ours, which has no quotes and no spaces.
 class Row {
@@ -205,7 +184,7 @@ FinishedRun read_run(const std::string& path) {
   FinishedRun run;
   run.path = path;
   run.detections = read_detections((folder / kLoopsFile).string());
-  if (is_there(folder / kRecordFile)) run.record_json = read_text(folder / kRecordFile);
+  if (is_there(folder / kRecordFile)) run.record_json = read_text((folder / kRecordFile).string());
   if (is_there(folder / kTruthFile)) {
     run.truth = {.same_place = read_place_runs((folder / kTruthFile).string()),
                  .near_place = read_place_runs((folder / kNotFalseFile).string()),

@@ -37,10 +37,11 @@ class Stopwatch {
 };
 
 /// Null if `record` names no map; else record.map_session is set.
-std::shared_ptr<MapWriter> open_map(RunRecord& record, bool keep_images) {
+std::shared_ptr<MapWriter> open_map(RunRecord& record, const RunOutput& out) {
   if (record.map_path.empty()) return nullptr;
-  auto map = std::make_shared<MapWriter>(record.map_path, record.options, record.input,
-                                         keep_images ? picture_jpeg : EncodeImage{});
+  auto map =
+      std::make_shared<MapWriter>(record.map_path, record.options, record.input,
+                                  out.keep_images ? picture_jpeg : EncodeImage{}, out.map_cache_mb);
   record.map_session = map->session();
   return map;
 }
@@ -48,7 +49,7 @@ std::shared_ptr<MapWriter> open_map(RunRecord& record, bool keep_images) {
 std::string folder_of(const RunRecord& record, const std::string& out) {
   if (!out.empty()) return out;
   if (record.map_path.empty()) {
-    throw Error(ErrorKind::option, "Nothing says where to keep the run; name a folder or a map.");
+    throw Error(ErrorKind::option, "The run has no output; give a folder or a map.");
   }
   const auto stem = std::filesystem::path(record.map_path).replace_extension().string();
   return fmt::format("{}_session_{}", stem, record.map_session);
@@ -85,7 +86,7 @@ RunFolder make_folder(const RunRecord& record, const RunOutput& out) {
 
 RecordedRun::RecordedRun(RunRecord record, const RunOutput& out)
     : record_(std::move(record)),
-      map_(open_map(record_, out.keep_images)),
+      map_(open_map(record_, out)),
       detector_(std::in_place, record_.options, map_),
       folder_(make_folder(record_, out)) {
   record_.stopped_by = kRunning;
@@ -113,6 +114,7 @@ void RecordedRun::detect(ImageSource& source, const RunListener& listener, bool 
     };
   }
   run(source, detector, recording, stop);
+  record_.early_end = source.early_end();
   if (map) map_damage_ = map->damage();
   if (evidence) evidence->finish();
   if (map) map->finish();

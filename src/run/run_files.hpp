@@ -18,6 +18,9 @@ inline constexpr const char* kUnknownFile = "unknown.csv";
 inline constexpr const char* kPositionsFile = "positions.csv";
 inline constexpr const char* kReportFile = "report.html";
 
+/// The folder in a run folder for the run that is being replaced.
+inline constexpr const char* kEarlierFolder = "earlier_run";
+
 inline bool is_there(const std::filesystem::path& file) {
   std::error_code error;
   return std::filesystem::exists(file, error);

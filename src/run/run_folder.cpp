@@ -16,12 +16,12 @@
 #include <sys/utsname.h>
 #include <unistd.h>
 
-#include "loopbit/database.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/instruction_set.hpp"
 #include "loopbit/version.hpp"
 #include "loopbit/write_file.hpp"
 
+#include "earlier_run.hpp"
 #include "run_files.hpp"
 
 namespace loopbit {
@@ -29,61 +29,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-/// All that a run may leave; a run that replaces another may not leave its files beside its own.
-/// Last those that tell a run from a data set, so that a run half removed is still one.
-std::vector<std::string> files_of_a_run() {
-  std::vector<std::string> names{kTruthFile,   kNotFalseFile,  kIgnoreFile,
-                                 kUnknownFile, kPositionsFile, kReportFile};
-  for (const char* suffix : kDatabaseSuffixes) {
-    names.push_back(std::string(kEvidenceFile) + suffix);
-  }
-  names.insert(names.end(), {kRecordFile, kLoopsFile});
-  return names;
-}
-
-/// Of the files of a run those that are in `folder`. Throws Error if one may not be replaced.
-std::vector<fs::path> files_to_replace(const fs::path& folder, bool overwrite,
-                                       const std::vector<std::string>& inputs) {
-  std::vector<fs::path> files;
-  for (const std::string& name : files_of_a_run()) {
-    if (is_there(folder / name)) files.push_back(folder / name);
-  }
-  if (files.empty()) return files;
-  const fs::path last = files.back().filename();
-  if (last != kRecordFile && last != kLoopsFile) {
-    throw Error(ErrorKind::output,
-                fmt::format("'{}' holds no earlier run, but a file {} that a run might replace; "
-                            "name another folder.",
-                            folder.string(), last.string()));
-  }
-  if (!overwrite) {
-    throw Error(ErrorKind::output,
-                fmt::format("'{}' holds an earlier run ({}); name another folder, or add "
-                            "--overwrite to replace it.",
-                            folder.string(), last.string()));
-  }
-  for (const fs::path& file : files) {
-    for (const std::string& input : inputs) {
-      std::error_code error;
-      if (!fs::equivalent(file, input, error)) continue;
-      throw Error(ErrorKind::output,
-                  fmt::format("'{}' is read by this run, which would replace it; name another "
-                              "folder.",
-                              input));
-    }
-  }
-  return files;
-}
-
-void make_folder(const fs::path& folder, bool overwrite, const std::vector<std::string>& inputs) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error) throw cannot_write(folder.string(), error.value());
-  for (const fs::path& file : files_to_replace(folder, overwrite, inputs)) {
-    if (!fs::remove(file, error)) throw cannot_write(file.string(), error.value());
-  }
-}
 
 /// "17", or "2:17" for frame 17 of session 2 of the map.
 std::string match_cell(const Detection& d) {
@@ -172,6 +117,7 @@ Json to_json(const RunRecord& record, const std::vector<Detection>& detections) 
   if (!record.map_path.empty()) {
     json["map"] = {{"path", record.map_path}, {"session", record.map_session}};
   }
+  if (!record.early_end.empty()) json["input"]["early_end"] = record.early_end;
   if (record.views != 1) json["input"]["views"] = record.views;
   if (!record.truth.empty()) json["truth"] = record.truth;
   if (record.truth_every != 1) json["truth_every"] = record.truth_every;
@@ -185,12 +131,28 @@ std::string frame_list(const char* comment, const std::vector<int>& frames) {
   return text;
 }
 
+/// What run.json has to spare from the beginning, for how it ends.
+constexpr std::size_t kRoomForTheEnd = 8192;
+
+/// Writes `text` over what is in `file`, whose length stays, so that a full disk has room for it.
+/// False if it is too long or cannot be written.
+bool write_in_place(const fs::path& file, std::string text) {
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  if (error || size < text.size()) return false;
+  text.resize(size, ' ');
+  text.back() = '\n';
+  std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+  stream.write(text.data(), static_cast<std::streamsize>(text.size()));
+  stream.close();
+  return !stream.fail();
+}
+
 }  // namespace
 
 RunFolder::RunFolder(const std::string& path, bool overwrite,
                      const std::vector<std::string>& inputs)
-    : path_(path) {
-  make_folder(path, overwrite, inputs);
+    : path_(path), earlier_(std::make_unique<EarlierRun>(path, overwrite, inputs)) {
   const fs::path loops = fs::path(path) / kLoopsFile;
   loops_.reset(std::fopen(loops.c_str(), "wx"));
   if (!loops_) throw cannot_write(loops.string(), errno);
@@ -214,6 +176,7 @@ void RunFolder::append(const std::string& row) {
 void RunFolder::add(const Detection& detection) {
   append(csv_row(detection));
   detections_.push_back(detection);
+  earlier_->leave_aside();
 }
 
 void RunFolder::write_truth(const GroundTruth& truth) {
@@ -245,10 +208,20 @@ std::string RunFolder::report_path() const { return (fs::path(path_) / kReportFi
 
 void RunFolder::write_record(const RunRecord& record) {
   // A path need not be UTF-8, which JSON is.
-  const std::string text =
-      to_json(record, detections_).dump(2, ' ', false, Json::error_handler_t::replace);
-  write_file((fs::path(path_) / kRecordFile).string(), text + '\n');
+  std::string text =
+      to_json(record, detections_).dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+  if (record.stopped_by == kRunning) text.append(kRoomForTheEnd - 1, ' ').push_back('\n');
+  const fs::path file = fs::path(path_) / kRecordFile;
+  try {
+    write_file(file.string(), text);
+  } catch (const Error&) {
+    if (!write_in_place(file, text)) throw;
+  }
+  const bool has_ended = record.stopped_by == "end" || record.stopped_by == "interrupt";
+  if (has_ended && !detections_.empty()) earlier_->remove();
 }
+
+RunFolder::~RunFolder() = default;
 
 double total_ms(const StepTimes& times) {
   return times.content_ms + times.retrieval_ms + times.features_ms + times.verification_ms;

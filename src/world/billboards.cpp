@@ -12,7 +12,7 @@ constexpr std::array<Color, 6> kSignPaints{rgb(0.70F, 0.10F, 0.10F), rgb(0.10F, 
                                            rgb(0.85F, 0.70F, 0.10F), rgb(0.85F, 0.85F, 0.85F),
                                            rgb(0.10F, 0.40F, 0.20F), rgb(0.70F, 0.10F, 0.10F)};
 
-/// What of a pixel lies inside a disc or ellipse; radii in metres.
+/// Share of a pixel inside a disc or ellipse; radii in metres.
 float disc(float x, float z, float radius_x, float radius_z, float footprint) {
   const float distance = std::sqrt(x * x / (radius_x * radius_x) + z * z / (radius_z * radius_z));
   return cover(distance, -1.0F, 1.0F, footprint / std::min(radius_x, radius_z));

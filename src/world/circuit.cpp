@@ -55,7 +55,7 @@ class Tree {
     table_[key_of(cell)];
   }
 
-  // From one of the youngest cells, so that arms grow long before they fork.
+  // Start from one of the newest cells, so that arms grow long before they fork.
   void grow(Random& random) {
     const int count = static_cast<int>(cells_.size());
     const int reach = random.chance(kForkShare) ? count : std::min(count, kYoungCells);
@@ -74,8 +74,8 @@ class Tree {
   Table table_;
 };
 
-/// Which way the walk around the tree leaves grid point `p`, with the tree on its left.
-/// Cell (i, j) has the grid points 2i, 2i + 1 by 2j, 2j + 1.
+/// The direction in which the walk around the tree leaves grid point `p`, with the tree on its
+/// left. Cell (i, j) has the grid points 2i, 2i + 1 by 2j, 2j + 1.
 std::size_t next_step(const Tree& tree, GridPoint p) {
   const int right = p.x & 1;
   const int top = p.y & 1;
@@ -127,7 +127,7 @@ void Circuit::measure(double length_m) {
   length_m_ = length_m;
 }
 
-// Evenly spread, each around a corner of the circuit, where nothing but the walls is ahead.
+// Blank stretches are spread evenly, each around a corner, where only the walls are ahead.
 void Circuit::place_blanks(double share) {
   if (share <= 0) return;
   const int stretches = std::max(1, floor_int(share * length_m_ / kUsualBlank_m + 0.5));
@@ -147,7 +147,7 @@ GridPoint Circuit::corner(int index) const {
 
 GridPoint Circuit::step_after(int index) const { return corner(index + 1) - corner(index); }
 
-// Where on the circuit this corner is.
+// Position of this corner on the circuit.
 double Circuit::middle_m(int index) const {
   const auto at = static_cast<std::size_t>(index);
   return (piece_start_m_[at] + piece_start_m_[at + 1]) / 2;

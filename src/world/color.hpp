@@ -24,13 +24,13 @@ constexpr Color blend(Color a, Color b, float share) {
   return {blend(a.b, b.b, share), blend(a.g, b.g, share), blend(a.r, b.r, share)};
 }
 
-/// What a pixel `footprint` wide at x sees of the interval low..high, 0 to 1.
+/// Share of a pixel of width `footprint` at x that lies in low..high, 0 to 1.
 inline float cover(float x, float low, float high, float footprint) {
   const float scale = 1.0F / std::max(footprint, 1e-4F);
   return clamp01((x - low) * scale + 0.5F) - clamp01((x - high) * scale + 0.5F);
 }
 
-/// How much of a detail of the given size is left when a pixel is `footprint` wide.
+/// Visible contrast of a detail of the given size in a pixel of width `footprint`.
 constexpr float resolved(float size, float footprint) {
   return clamp01(1.6F - footprint * (1.6F / size));
 }

@@ -32,7 +32,7 @@ struct Camera {
 
 enum class Face { v_low, v_high, u_low, u_high };
 
-/// What one column of the image sees of one surface, between two rows.
+/// The part of one surface that one image column sees, between two rows.
 struct Piece {
   enum class Kind { ground, wall, slope, board };
 
@@ -47,14 +47,14 @@ struct Piece {
   double climb = 0.0;     // slopes: metres up for each metre of depth
 };
 
-/// Finds what each column of an image sees of a scene.
+/// Finds the surfaces that each image column sees.
 class ColumnTracer {
  public:
   /// `scene` must outlive the tracer.
   ColumnTracer(const Camera& camera, const Scene& scene);
 
-  /// What `column` sees, from near to far, each piece clipped to what nearer ones leave of it.
-  /// Returns the row above which it sees the sky. Overwrites `pieces`.
+  /// The pieces that `column` sees, from near to far, without the parts that nearer ones hide.
+  /// Returns the row above which the column sees the sky. Overwrites `pieces`.
   float trace(int column, std::vector<Piece>& pieces) const;
 
  private:

@@ -32,7 +32,7 @@ double Drive::along_m(int frame) const {
 
 bool Drive::blank(int frame) const { return circuit_.blank_at(along_m(frame)); }
 
-// After the first lap the camera drifts to its new line instead of leaping there.
+// After the first lap the camera moves to its new line gradually.
 double Drive::left_m(int lap, bool reversed, double driven_m) const {
   double line = -kLane_m;
   if (lap > 0) {

@@ -12,7 +12,7 @@ constexpr Color kSlab = rgb(0.57F, 0.55F, 0.52F);
 constexpr Color kCurb = rgb(0.66F, 0.65F, 0.63F);
 constexpr Color kGarden = rgb(0.36F, 0.40F, 0.24F);
 
-/// A point of a street: metres along it, and across from its centre line. pixel_* see as much.
+/// A point of a street: metres along it, and across from its centre line. pixel_* are footprints.
 struct StreetSpot {
   std::uint32_t street = 0;
   float along = 0.0F;
@@ -37,7 +37,7 @@ Color asphalt(std::uint32_t seed, float x, float y, float pixel) {
   return color * (1.0F - 0.5F * broken * crack);
 }
 
-// Squares where the road was opened and closed again.
+// Square patches of repaired road.
 Color patches(Color color, std::uint32_t seed, float x, float y, float pixel) {
   constexpr float kCell_m = 5.0F;
   const int cx = floor_int(x / kCell_m);

@@ -9,7 +9,7 @@
 #include "circuit.hpp"
 #include "color.hpp"
 
-// What stands in the town around one frame. A scene is made for a frame and thrown away after it.
+// The objects around one frame. A scene is made for one frame.
 namespace loopbit::town {
 
 enum class Wall { house, plain, chimney, hedge, car };
@@ -89,7 +89,7 @@ constexpr float kFront_m = 7.5F;
 constexpr double kView_m = 150.0;
 constexpr double kBillboardView_m = 80.0;
 
-/// How far from a blank part of the circuit nothing but plain walls stands.
+/// Distance around a blank part of the circuit with nothing but plain walls.
 constexpr double kBlankReach_m = 26.0;
 
 }  // namespace loopbit::town

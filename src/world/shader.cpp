@@ -66,7 +66,7 @@ float Shader::metres_a_pixel(double depth_m) const {
 // Metres up for each metre of depth, along the ray through the middle of a row.
 double Shader::rise_of(float row) const { return (camera_.horizon_px - row) / camera_.focal_px; }
 
-// The row that the upper edge crosses is mixed with what is behind, as far as it is covered.
+// Blends the row of the upper edge with the background, by coverage.
 template <typename ColorAt>
 void Shader::fill(const Piece& piece, std::vector<Color>& rows, const ColorAt& color_at) const {
   const int first = std::max(0, floor_int(piece.top_px));
@@ -125,7 +125,7 @@ void Shader::fill_wall(const Piece& piece, Vec2 normal, std::vector<Color>& rows
   const Vec2 at = camera_.eye + ray_ * piece.depth_m;
   const float facing = level_sun_ * static_cast<float>(std::max(0.0, dot(normal, light_.to_sun)));
   const float shade_m = facing > 0 ? shadows_.height_at(at + normal * kOffWall_m) : 0.0F;
-  // The open sky lights a wall more the less it faces the ground.
+  // A wall gets more light from the open sky the less it faces the ground.
   const float sky = 0.9F + 0.1F * static_cast<float>(dot(normal, {0.6, 0.8}));
   fill(piece, rows, [&](float row) {
     const auto z = static_cast<float>(camera_.eye_m + rise_of(row) * piece.depth_m);

@@ -23,7 +23,7 @@ constexpr double kFurnitureLine_m = 6.0;
 constexpr double kFurnitureSlot_m = 7.0;
 constexpr int kSlotsPerLamp = 3;
 
-// Salts keep the hashes of different things at one place apart.
+// Salts give different things at one place different hashes.
 constexpr std::uint32_t kLotSalt = 0x10701U;
 constexpr std::uint32_t kTypeSalt = 0x7e1bU;
 constexpr std::uint32_t kStreetSalt = 0x57e7U;
@@ -58,7 +58,7 @@ int lots_along(double length_m) {
   return std::max(1, floor_int(length_m / kUsualLot_m + 0.5));
 }
 
-/// Of a square grid of lines, the distance from the nearest of them.
+/// Distance to the nearest line of a square grid.
 double from_nearest_line(double value, double pitch, double lines_a_metre) {
   return value - pitch * floor_int(value * lines_a_metre + 0.5);
 }
@@ -169,7 +169,7 @@ void Town::add_lot(const Lot& lot, Scene& scene) const {
       {Shape::tree, lot.front + lot.inwards * 3.5, height * 0.4F, height, random.bits(), 0.0F});
 }
 
-// Streets that the circuit leaves aside end at its blank crossings.
+// Streets that the circuit does not use end at its blank crossings.
 void Town::add_closing_walls(GridPoint crossing, Scene& scene) const {
   for (const GridPoint step : circuit_.closed_steps(crossing)) {
     const Vec2 outwards{static_cast<double>(step.x), static_cast<double>(step.y)};

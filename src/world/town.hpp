@@ -32,7 +32,7 @@ struct Lot {
   HouseStyle style;
 };
 
-/// What a house made from `seed` looks like, if it is `depth_m` deep.
+/// The style of a house with this `seed` and depth.
 HouseStyle make_house_style(std::uint32_t seed, double depth_m);
 
 /// The town: streets on a square grid everywhere, blocks with houses around their edges between
@@ -42,17 +42,17 @@ class Town {
   /// `circuit` says where the plain walls are; it must outlive the town.
   Town(std::uint32_t seed, const Circuit& circuit, double look_alike);
 
-  /// Adds all that stands still within sight of `eye`.
+  /// Adds all static objects within sight of `eye`.
   void add_surroundings(Vec2 eye, Scene& scene) const;
 
   /// The lot that a ray from `point` in a street enters first, and how far it goes until then.
   /// `direction` is a unit vector that is parallel to no street.
   [[nodiscard]] LotKey first_lot(Vec2 point, Vec2 direction, double& distance_m) const;
 
-  /// Height of what stands on a lot, where it casts its shadow.
+  /// Height of the object on a lot at the point that casts the shadow.
   [[nodiscard]] float top_m(const LotKey& key) const;
 
-  /// Whether the ground has nothing on it here.
+  /// Whether the ground is bare here.
   [[nodiscard]] bool bare_ground(Vec2 point) const;
 
   [[nodiscard]] double pitch_m() const { return pitch_m_; }

@@ -7,7 +7,7 @@
 #include "light.hpp"
 #include "town.hpp"
 
-// What the pixels of a frame ask the town again and again.
+// Caches for repeated queries of the pixels of a frame.
 namespace loopbit::town {
 
 /// The shadows of houses. Remembers the heights it has looked up; not thread-safe.

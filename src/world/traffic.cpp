@@ -125,7 +125,7 @@ void Traffic::add_parked(int frame, Vec2 eye, Scene& scene) const {
   }
 }
 
-// The road never repeats in these numbers: the n-th slot of the whole drive holds a car or not.
+// Slots are numbered over the whole drive, so traffic never repeats.
 void Traffic::add_oncoming(int frame, Scene& scene) const {
   const double camera_left = drive_.left_m(frame);
   const double left = std::clamp(camera_left + (camera_left > 0 ? -kPassing_m : kPassing_m),
@@ -142,7 +142,7 @@ void Traffic::add_oncoming(int frame, Scene& scene) const {
   }
 }
 
-// One car ahead of the camera, now near, now far, now out of sight.
+// One car ahead of the camera, at varying distance.
 void Traffic::add_leader(int frame, Scene& scene) const {
   const double mind = smooth_noise(seed_ ^ kLeaderSalt, frame / kLeaderFrames);
   const double ahead =

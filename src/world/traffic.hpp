@@ -7,13 +7,13 @@
 
 namespace loopbit::town {
 
-/// Cars and people: other ones in every lap, as many as `busy` (0 to 1) says.
+/// Cars and people, different in every lap. `busy` (0 to 1) sets their number.
 class Traffic {
  public:
   /// `circuit` and `drive` must outlive the traffic.
   Traffic(std::uint32_t seed, const Circuit& circuit, const Drive& drive, double busy);
 
-  /// Adds all that is within sight of the camera in `frame`.
+  /// Adds everything within sight of the camera in `frame`.
   void add_to(int frame, Scene& scene) const;
 
  private:

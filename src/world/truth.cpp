@@ -11,8 +11,8 @@
 namespace loopbit::town {
 namespace {
 
-/// Frames by the square of the plane in which they were taken; squares as wide as the rule reaches,
-/// so that all that counts is in nine of them.
+/// Frames by square of the plane. Squares are as wide as the rule reaches, so that nine of them
+/// contain all frames that can match.
 class Squares {
  public:
   explicit Squares(double width_m) : width_m_(width_m) {}

@@ -10,7 +10,7 @@
 
 namespace loopbit::town {
 
-/// When two views show the same place.
+/// The rule by which two views show the same place.
 struct PlaceRule {
   double distance_m = 4.0;  // between the camera centres, at most
   double cos_turn = 0.866;  // of the angle between the headings, at least

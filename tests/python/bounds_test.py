@@ -16,27 +16,36 @@ import loopbit
 NAN, HUGE = float("nan"), 1 << 40
 # A file name that is no UTF-8.
 LATIN = os.fsdecode(b"caf\xe9")
-# Each function reads a pipe that another thread of Python fills: if it kept the GIL, forever.
-READ_PIPES = """
-import os, sys, threading
+# While a function reads a long file, another thread of Python counts: if the function kept the GIL,
+# not beyond 1 or 2.
+READ_LONG_FILES = """
+import os, sys, threading, time
 import loopbit
 from loopbit import _loopbit
 
-def fill(path, text):
-    with open(path, "w") as file:
-        file.write(text)
+ticks = 0
 
-for number, (read, text) in enumerate([
-        (loopbit.read_match_list, "5,1"), (loopbit.truth_kind, "5,1"),
-        (_loopbit._read_place_runs, "5,1"), (_loopbit._read_frame_list, "5"),
-        (lambda path: loopbit.read_positions(path, [None]), "1 0 0 0 0 1 0 0 0 0 1 0"),
-        (loopbit.load_options, "{}")]):
-    path = os.path.join(sys.argv[1], str(number))
-    os.mkfifo(path)
-    thread = threading.Thread(target=fill, args=(path, text + "\\n"))
-    thread.start()
+def tick():
+    global ticks
+    while True:
+        ticks += 1
+        time.sleep(0.0005)
+
+def ticks_while(read, path):
+    before = ticks
     read(path)
-    thread.join()
+    return ticks - before
+
+threading.Thread(target=tick, daemon=True).start()
+for number, (read, text, comment) in enumerate([
+        (loopbit.read_match_list, "5,1", "#"), (loopbit.truth_kind, "5,1", "#"),
+        (_loopbit._read_place_runs, "5,1", "#"), (_loopbit._read_frame_list, "5", "#"),
+        (lambda path: loopbit.read_positions(path, [None]), "1 0 0 0 0 1 0 0 0 0 1 0", "#"),
+        (loopbit.load_options, "{}", "//")]):
+    path = os.path.join(sys.argv[1], str(number))
+    with open(path, "w") as file:
+        file.write(f"{comment}\\n" * 300_000 + text + "\\n")
+    assert any(ticks_while(read, path) > 2 for _ in range(50)), f"number {number} keeps the GIL"
 """
 # Ends while daemon threads are inside the module, or in what it calls.
 LEAVE_DAEMONS = """
@@ -180,7 +189,7 @@ def test_names_that_are_no_utf8(dataset, tmp_path):
 
 
 def test_files_are_read_while_other_threads_run(tmp_path):
-    subprocess.run([sys.executable, "-c", READ_PIPES, tmp_path], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", READ_LONG_FILES, tmp_path], check=True, timeout=60)
 
 
 @pytest.mark.parametrize("work", ["process", "run", "run_slowly", "run_folder", "write_dataset"])

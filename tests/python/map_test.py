@@ -179,6 +179,65 @@ def test_writer(images, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["new.db"]
 
 
+def test_a_writer_is_refused_in_a_forked_child(images, tmp_path):
+    script = """
+import os, sys, threading, time
+import loopbit, numpy
+map = loopbit.MapWriter(sys.argv[1], loopbit.LoopDetectorOptions(), "parent")
+detector = loopbit.LoopDetector(map=map)
+image = numpy.zeros((240, 320), numpy.uint8)
+detector.process(image)
+uses = [map.flush, map.finish, lambda: map.session, lambda: map.saved_frames, lambda: map.damage,
+        lambda: detector.process(image)]
+child = os.fork()
+if child == 0:
+    for use in uses:
+        try:
+            use()
+        except loopbit.OptionError as error:
+            assert "forked" in str(error) and sys.argv[1] in str(error), error
+        else:
+            raise AssertionError("not refused")
+    # One of its own is no trouble.
+    with loopbit.MapWriter(sys.argv[1] + ".child", loopbit.LoopDetectorOptions(), "child") as own:
+        loopbit.LoopDetector(map=own).process(image)
+    sys.exit(7)    # all is torn down, not left as os._exit() would
+assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+detector.process(image)
+map.finish()
+"""
+    path = tmp_path / "map.db"
+    subprocess.run([sys.executable, "-c", script, path], check=True, stdin=subprocess.DEVNULL,
+                   timeout=60)
+    assert [s.frames for s in loopbit.MapReader(path).sessions] == [2]
+    assert [s.frames for s in loopbit.MapReader(f"{path}.child").sessions] == [1]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["map.db", "map.db.child"]
+
+
+def test_a_refused_writer_leaves_the_locks_of_others(images, tmp_path):
+    path = tmp_path / "map.db"
+    map = loopbit.MapWriter(path, loopbit.LoopDetectorOptions(), "drive")
+    loopbit.LoopDetector(map=map).process(images[0])
+    map.flush()
+    for _ in range(3):
+        with pytest.raises(OSError, match="is being written"):
+            loopbit.MapWriter(path, loopbit.LoopDetectorOptions(), "another")
+    # Another process may not take the log away.
+    script = "import sqlite3, sys; print(*sqlite3.connect(sys.argv[1], timeout=0).execute(sys.argv[2]))"
+    ran = subprocess.run([sys.executable, "-c", script, path, "PRAGMA journal_mode = DELETE"],
+                         capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert "locked" in ran.stderr
+    map.finish()
+
+
+def test_a_cache_changes_no_result(made, images):
+    found = []
+    for cache_mb in (0, 64):
+        detector = loopbit.LoopDetector(map=loopbit.MapReader(made[0], cache_mb=cache_mb))
+        found.append([as_row(detector.query(image)) for image in images[70:73]])
+    assert found[0] == found[1]
+
+
 def test_a_detector_may_outlive_the_map_that_it_was_given(made, images):
     detector = loopbit.LoopDetector(map=loopbit.MapReader(made[0]))
     gc.collect()
@@ -335,7 +394,7 @@ def test_run_folder_continues_a_map_as_the_command(commanded, laps, tmp_path):
     assert json.loads(run.record_json)["map"] == {"path": str(path), "session": 2}
     ours, theirs = (loopbit.MapReader(map).places().tobytes() for map in (path, commanded))
     assert ours == theirs
-    with pytest.raises(loopbit.OptionError, match="where to keep the run"):
+    with pytest.raises(loopbit.OptionError, match="The run has no output"):
         loopbit.run_folder(laps[0])
 
 

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """The parts one by one: images, contents, features, the index, the built-in world."""
 
+import pathlib
 import pickle
 
 import numpy as np
@@ -90,6 +91,30 @@ def test_unreadable_image(tmp_path):
     (tmp_path / "1.png").write_bytes(b"no image")
     frame = next(loopbit.open_source(tmp_path))
     assert frame.image is None and "1.png" in frame.error and "1.png" in repr(frame)
+
+
+def test_large_image(tmp_path):
+    (tmp_path / "1.pgm").write_bytes(b"P5 2000 1000 255\n" + bytes(2_000_000))
+    assert next(loopbit.open_source(tmp_path, max_megapixels=2)).error == ""
+    frame = next(loopbit.open_source(tmp_path, max_megapixels=1))
+    assert frame.image is None and "2000 x 1000 pixels, but max_megapixels is 1" in frame.error
+    with pytest.raises(loopbit.OptionError, match="max_megapixels is 0"):
+        loopbit.open_source(tmp_path, max_megapixels=0)
+
+
+def test_a_video_that_is_cut_off(tmp_path):
+    tests = pathlib.Path(__file__).resolve().parent.parent
+    whole = (tests.parent / "fuzz/corpus/image_headers/tiny.avi").read_bytes()
+    video = tmp_path / "v.avi"
+    for size in (len(whole), len(whole) - 20):
+        video.write_bytes(whole[:size])
+        source = loopbit.open_source(video)
+        assert source.early_end() == "" and len(list(source)) == 1
+        told = []
+        loopbit.run(video, on_bad_frame=told.append)
+        assert "16 x 16" in told.pop(0), "the frame is too small for a detector"
+        assert told == ([source.early_end()] if size < len(whole) else [])
+    assert f"'{video}' is cut off after {size} of" in source.early_end()
 
 
 def test_content(images):

@@ -24,8 +24,8 @@ for part in cmake python src; do
   diff -r --exclude='*.egg-info' --exclude=__pycache__ "$scratch/tree/$part" "$scratch/loopbit-$version/$part"
 done
 cmake -S "$scratch/loopbit-$version" -B "$scratch/configured" -G Ninja --log-level=WARNING \
-  -DLOOPBIT_BUILD_PYTHON=ON -DLOOPBIT_BUILD_REPORT=ON -DLOOPBIT_BUILD_CLI=OFF \
-  -DLOOPBIT_BUILD_TESTS=OFF -DLOOPBIT_BUILD_BENCHMARKS=OFF -DPython3_EXECUTABLE="$python"
+  -DLOOPBIT_BUILD_PYTHON=ON -DLOOPBIT_BUILD_CLI=OFF -DLOOPBIT_BUILD_TESTS=OFF \
+  -DLOOPBIT_BUILD_BENCHMARKS=OFF -DPython3_EXECUTABLE="$python"
 
 "$python" -m venv --system-site-packages "$scratch/venv"
 PIP_NO_INDEX=1 PIP_DISABLE_PIP_VERSION_CHECK=1 LOOPBIT_BUILD_DIR=$build \

@@ -101,7 +101,7 @@ def test_times_are_those_of_readable_frames(images):
     assert [vertices[vertices[:, 0] == frame, 1].max() for frame in (1, 4, 5)] == (
         pytest.approx(total))
     assert set(vertices[:, 0]) == {1, 4, 5}
-    assert plots.times(found[2:4]).get_ylabel() == "ms a frame"
+    assert plots.times(found[2:4]).get_ylabel() == "ms per frame"
 
 
 def test_similarity_of_contents(images):

@@ -178,6 +178,19 @@ def test_what_makes_no_sense_in_a_record_is_as_if_missing(dataset, tmp_path, par
     assert loopbit.evaluate(tmp_path / "run", given).decision.positives == positives
 
 
+def test_a_run_read_to_its_end_has_no_more_frames(dataset, tmp_path):
+    (tmp_path / "later.csv").write_text("5,1\n20,1\n")
+    run = loopbit.run_folder(loopbit.open_source(dataset / "images", limit=10), tmp_path / "run",
+                             evidence=False, truth=tmp_path / "later.csv")
+    assert run.truth.same_place.size == 2
+    assert loopbit.evaluate(run, tmp_path / "later.csv").decision.positives == 1
+    record = json.loads(run.record_json)
+    record["input"]["limit"] = 0
+    (tmp_path / "run" / "run.json").write_text(json.dumps(record))
+    with pytest.raises(loopbit.InputError, match="frame 20, but the sequence has 10 frames"):
+        loopbit.evaluate(tmp_path / "run", tmp_path / "later.csv")
+
+
 def test_frames_that_nobody_knows():
     truth = loopbit.GroundTruth([[10, 0, 2], [12, 4, 4]], unknown=[5, 12])
     assert truth.unknown.tolist() == [5, 12] and truth.every == 1 and "unknown=2" in repr(truth)
@@ -197,6 +210,10 @@ BAD_ARGUMENTS = [
     ({"truth": "none.csv"}, loopbit.InputError, "none.csv"),
     ({"truth": "damaged.csv"}, loopbit.InputError, "line 2"),
     ({"truth": "few.txt"}, loopbit.InputError, "has 3 poses"),
+    ({"truth": "many.txt"}, loopbit.InputError, "has 121 poses, but the sequence has 120 frames"),
+    ({"truth": "later.csv"}, loopbit.InputError, "frame 120, but the sequence has 120 frames"),
+    ({"truth": "words.csv"}, loopbit.InputError, "query,first,last"),
+    ({"truth": "none\x1b.csv"}, loopbit.InputError, r"none\\x1b\.csv"),
     ({"truth": [[5, 1]]}, TypeError, "truth is"),
     ({"positions_m": "none.txt"}, loopbit.InputError, "none.txt"),
     ({"positions_m": "few.txt"}, loopbit.InputError, "has 3 poses"),
@@ -211,6 +228,9 @@ BAD_ARGUMENTS = [
 def test_bad_arguments_cost_no_run(dataset, tmp_path, arguments, error, words):
     (tmp_path / "damaged.csv").write_text("5,1\n6,one\n")
     (tmp_path / "few.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 3)
+    (tmp_path / "many.txt").write_text("1 0 0 0 0 1 0 0 0 0 1 0\n" * 121)
+    (tmp_path / "later.csv").write_text("5,1\n120,1\n")
+    (tmp_path / "words.csv").write_text("hello world\n")
     for name, value in arguments.items():
         if name in ("truth", "positions_m") and isinstance(value, str):
             path = dataset / value
@@ -233,7 +253,7 @@ def test_files_do_not_count_from_the_middle(dataset, tmp_path, take, arguments, 
     for _ in range(10):
         take(source)
     paths = {name: dataset / file for name, file in arguments.items()}
-    with pytest.raises(loopbit.OptionError, match=f"{words}.* 10 .* were taken.*open it anew"):
+    with pytest.raises(loopbit.OptionError, match=f"{words}.* 10 .* already read; open it again"):
         loopbit.run_folder(source, tmp_path / "run", **paths)
     assert not any(tmp_path.iterdir())
     run = loopbit.run_folder(source, tmp_path / "run", truth=loopbit.GroundTruth([[2, 0]]),
@@ -320,14 +340,14 @@ def test_bad_evaluations(run, dataset):
         loopbit.evaluate(run, protocol="kitti")
     with pytest.raises(loopbit.OptionError, match="as the path"):
         loopbit.evaluate(run, run.truth, protocol="ibow-lcd")
-    for setting, words in (({"poses": loopbit.PoseTruthOptions()}, "poses is about poses"),
-                           ({"views": 2}, "views is about a loop matrix"),
-                           ({"variable": "truth"}, "variable is about a loop matrix")):
+    for setting, words in (({"poses": loopbit.PoseTruthOptions()}, "poses applies to poses"),
+                           ({"views": 2}, "views applies to a loop matrix"),
+                           ({"variable": "truth"}, "variable applies to a loop matrix")):
         with pytest.raises(loopbit.OptionError, match=words):
             loopbit.read_truth(dataset / "truth.csv", **setting)
-    with pytest.raises(ValueError, match="defined on poses, but .* is a list of true places"):
+    with pytest.raises(ValueError, match="requires poses, but .* is a list of true places"):
         loopbit.evaluate(run, dataset / "truth.csv", protocol="kitti")
-    with pytest.raises(ValueError, match="what is true"):
+    with pytest.raises(ValueError, match="no ground truth"):
         loopbit.evaluate(loopbit.MatchList([1], [0]))
     with pytest.raises(ValueError, match="tolerance_frames is -1"):
         loopbit.evaluate(run, tolerance_frames=-1)

@@ -39,8 +39,14 @@ def test_setup_wants_node_where_it_is_missing_or_old(tmp_path, node, npm, wanted
         program(tmp_path / "node", f"#!/bin/sh\necho {node}\n")
     if npm:
         program(tmp_path / "npm", "#!/bin/sh\n")
-    listed = run("/bin/bash", SCRIPTS / "setup", "--list", "build", path=tmp_path).split()
+    listed = run("/bin/bash", SCRIPTS / "setup", "--list", path=tmp_path).split()
     assert ("nodejs" in listed) == wanted and "cmake" in listed
+
+
+@pytest.mark.parametrize("packages", ["build", "bench", "python", "packages"])
+def test_building_needs_no_node(tmp_path, packages):
+    listed = run("/bin/bash", SCRIPTS / "setup", "--list", packages, path=tmp_path).split()
+    assert "nodejs" not in listed and "npm" not in listed and "cmake" in listed
 
 
 @pytest.fixture

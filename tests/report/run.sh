@@ -1,11 +1,11 @@
 #!/usr/bin/env bash
-# run.sh LOOPBIT WEB: tests the report page in a headless Chromium, on pages that LOOPBIT makes and on
-# made-up data in the page of the folder WEB, where it was built.
+# run.sh LOOPBIT: tests the report page in a headless Chromium, on pages that LOOPBIT makes and on
+# made-up data. Needs the packages that scripts/page installs.
 set -euo pipefail
 
 loopbit=$1
-web=$2
 here=$(dirname "$(readlink -f "$0")")
+root=$(dirname "$(dirname "$here")")
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
@@ -24,7 +24,7 @@ printf 'query,match\n' >"$scratch/no_revisit.csv"
 "$loopbit" compare "one=$scratch/none.csv" "another=$scratch/none.csv" \
   --truth "$scratch/no_revisit.csv" --out "$scratch/no_frames.html"
 
-node "$here/report_test.mjs" --playwright "$web/node_modules" --page "$web/dist/report.html" \
+node "$here/report_test.mjs" --playwright "$root/build/page/node_modules" --page "$root/src/report/report.html" \
   --report "$scratch/demo/report.html" --run-json "$scratch/demo/run.json" \
   --report "$scratch/second/report.html" --run-json "$scratch/second/run.json" \
   --report "$scratch/compared.html" --opens "$scratch/no_frames.html"

@@ -9,10 +9,9 @@
 
 namespace loopbit {
 
-/// One setting of an options struct: its name, where it lives, the values it may take (both ends
-/// included) and one line that says what it means. Every options struct lists its settings in
-/// `static constexpr auto fields()`; validation, the configuration file, the command line and its
-/// help all read that list, and defaults stand nowhere but in the struct.
+/// One setting of an options struct: its name, its member, its range (inclusive) and one line of
+/// help. Every options struct lists its settings in `static constexpr auto fields()`. Validation,
+/// settings files, the command and its help read that list. Defaults are only in the struct.
 template <typename Struct, typename Value>
 struct Field {
   static_assert(std::is_same_v<Value, int> || std::is_same_v<Value, double> ||
@@ -42,11 +41,11 @@ void for_each_field(Visit&& visit) {
   std::apply([&](const auto&... field) { (visit(field), ...); }, Struct::fields());
 }
 
-/// Throws Error (kind option) that says `section.name is value, but must be between min and max`.
+/// Throws Error (kind option): `section.name is value, but must be between min and max`.
 void check_range(std::string_view section, std::string_view name, double value, double min,
                  double max);
 
-/// Throws Error for the first field of `options` that lies outside its range (NaN does).
+/// Throws Error for the first field of `options` that is outside its range (NaN is).
 template <typename Struct>
 void validate(const Struct& options, std::string_view section) {
   for_each_field<Struct>([&](const auto& field) {
@@ -55,14 +54,14 @@ void validate(const Struct& options, std::string_view section) {
   });
 }
 
-/// Reads all of `text` as a value: a whole number, a number, or "true" / "false". `name` is what
-/// errors call it. Throws Error (kind option) if it is none.
+/// Parses all of `text` as an integer, a number, or "true" / "false". Errors mention `name`. Throws
+/// Error (kind option) if `text` is not such a value.
 void parse_value(const std::string& text, const std::string& name, int& value);
 void parse_value(const std::string& text, const std::string& name, double& value);
 void parse_value(const std::string& text, const std::string& name, bool& value);
 
-/// Sets the field called `name`; false if there is none. Throws Error (kind option) if `text` is
-/// not of its type or out of its range, and leaves it as it was.
+/// Sets the field `name`; returns false if there is none. Throws Error (kind option) if `text` has
+/// the wrong type or is out of range; the field is then unchanged.
 template <typename Struct>
 bool set_field(Struct& options, std::string_view section, std::string_view name,
                const std::string& text) {

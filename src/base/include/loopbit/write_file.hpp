@@ -7,13 +7,12 @@
 
 namespace loopbit {
 
-/// Writes `bytes` to `path`, all of them or nothing: a full disk leaves what was there before. A
-/// link stays one, and what is no regular file, such as a device or a pipe, is written as it is.
-/// Throws Error (kind output).
+/// Writes `bytes` to `path`, completely or not at all: if the disk is full, the old file remains.
+/// Symbolic links are kept, and devices and pipes are written directly. Throws Error (kind output).
 void write_file(const std::string& path, std::string_view bytes);
 
-/// The file that `path` names, through all symbolic links, whether it is there or not; `path`
-/// itself where the system does not say.
+/// Resolves all symbolic links of `path`, whether the file exists or not. Returns `path` if the
+/// system cannot resolve it.
 std::string resolved_path(const std::string& path);
 
 }  // namespace loopbit

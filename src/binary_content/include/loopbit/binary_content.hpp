@@ -19,8 +19,8 @@ namespace loopbit {
 /// Side of the saliency map and of the binary content, in pixels.
 inline constexpr int kContentSide = 64;
 
-/// The 64 x 64 bits an image is recognised by. Row y is rows[y], column x is its bit x (bit 0 is
-/// the left edge), so shifting the image sideways is a shift of 64 words.
+/// The binary content of an image: 64 x 64 bits. Row y is rows[y], column x is its bit x (bit 0 is
+/// the left edge), so shifting the image sideways shifts 64 words.
 struct BinaryContent {
   alignas(64) std::array<std::uint64_t, kContentSide> rows{};
 
@@ -30,21 +30,23 @@ struct BinaryContent {
 /// |O|: the number of set pixels, 0 to 4096.
 [[nodiscard]] int count(const BinaryContent& content);
 
-/// M(O): the mean coordinate of the set pixels, x right and y down, each in [0, 63]. The middle of
+/// M(O): the mean coordinate of the set pixels, x right and y down, each in [0, 63]. The centre of
 /// the map (31.5, 31.5) if none is set.
 [[nodiscard]] cv::Point2d center(const BinaryContent& content);
 
-/// The content moved `columns` to the right (left if negative); what leaves the map is lost.
+/// The content shifted `columns` to the right (left if negative). Pixels that leave the map are
+/// dropped.
 [[nodiscard]] BinaryContent shift_columns(const BinaryContent& content, int columns);
 
-/// The content at the shifts that a tolerance of 0 or more columns stands for, from left to right:
-/// by even numbers of columns up to it, and by the tolerance itself, either way. Contents are
-/// blurred: moved by a single column, one still has a xi of 0.9 with itself.
+/// The content at all shifts of a tolerance of 0 or more columns, from left to right: by even
+/// numbers of columns up to the tolerance, and by the tolerance itself, either way. Odd shifts are
+/// not needed, because contents are blurred: shifted by one column, a content still has a xi of 0.9
+/// with itself.
 [[nodiscard]] std::vector<BinaryContent> tolerated_shifts(const BinaryContent& content,
                                                           int tolerance_columns);
 
 /// xi(O1, O2) = |O1 & O2| / max(|O1|, |O2|), in [0, 1]; 0 if either is empty. With a shift
-/// tolerance, the largest over the tolerated shifts of `a`; |O1| is counted before shifting. Wang
+/// tolerance, the maximum over the tolerated shifts of `a`; |O1| is counted before shifting. Wang
 /// et al. 2019, section III-B.
 [[nodiscard]] double similarity(const BinaryContent& a, const BinaryContent& b,
                                 int shift_tolerance_columns = 0);
@@ -64,11 +66,11 @@ struct BinaryContentOptions {
     using S = BinaryContentOptions;
     return std::tuple{
         Field{"gamma", &S::gamma, 1.1, 16.0,
-              "a pixel is set where its saliency exceeds gamma times the mean; larger keeps fewer"},
+              "a pixel is set if its saliency exceeds gamma times the mean; larger sets fewer"},
         Field{"blur_sigma_px", &S::blur_sigma_px, 0.5, 8.0,
-              "standard deviation of the Gaussian over the 64 x 64 saliency map, pixels"},
+              "standard deviation of the Gaussian on the 64 x 64 saliency map, pixels"},
         Field{"residual_radius_px", &S::residual_radius_px, 1, 7,
-              "the log amplitude spectrum is averaged over a box of 2 * radius + 1 pixels a side"}};
+              "the log amplitude spectrum is averaged over a box of side 2 * radius + 1 pixels"}};
   }
 };
 
@@ -76,11 +78,10 @@ struct BinaryContentOptions {
 ///
 /// `gray`: 8 bits, at least 32 x 32. Hou and Zhang, "Saliency Detection: A Spectral Residual
 /// Approach", CVPR 2007, eq. 3 to 6; Wang et al. 2019, section III-A. Values are >= 0, and constant
-/// where the image is flat. Throws Error (kind input) if `gray` is smaller. Cost: see
-/// bm_binary_content.
+/// for a flat image. Throws Error (kind input) if `gray` is too small. Cost: see bm_binary_content.
 cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options = {});
 
-/// The pixels whose saliency exceeds gamma times the mean. An image without contrast has none.
+/// Sets the pixels whose saliency exceeds gamma times the mean. An image without contrast has none.
 /// Wang et al. 2019, section III-A.
 BinaryContent binarize(const cv::Mat1f& saliency, double gamma);
 

@@ -9,13 +9,15 @@
 #include <string>
 #include <string_view>
 
+#include "loopbit/open_file.hpp"
+
 struct sqlite3;
 struct sqlite3_stmt;
 
 namespace loopbit {
 
 /// SQLite keeps a database in a file and, while it is written or after a crash, in those beside it.
-inline constexpr std::array kDatabaseSuffixes{"", "-wal", "-shm"};
+inline constexpr std::array kDatabaseSuffixes{"", "-wal", "-shm", "-journal"};
 
 /// Removes those files; what cannot be removed stays.
 void remove_database(const std::string& path);
@@ -41,6 +43,9 @@ class Database {
     std::string read;  ///< also where a file to be written is damaged
   };
 
+  /// The bytes that begin every SQLite file.
+  using Header = std::array<unsigned char, 100>;
+
   Database(std::string path, Access access, Remedies remedies);
 
   /// Runs statements that give no rows.
@@ -48,6 +53,15 @@ class Database {
 
   /// The first column of the first row of what `sql` gives; 0 where there is none.
   [[nodiscard]] std::int64_t integer(const std::string& sql) const;
+
+  /// Those of the file itself, whatever is in its log, which is not opened; zeros in a shorter one.
+  [[nodiscard]] Header header() const;
+
+  /// Sets the number in the file's header that otherwise counts changes of its tables.
+  void set_schema_version(std::int32_t version) const;
+
+  /// The file, and the right to write it.
+  [[nodiscard]] OpenFile& file() const { return *file_; }
 
   [[noreturn]] void fail() const;
   [[nodiscard]] sqlite3* handle() const { return handle_.get(); }
@@ -61,6 +75,7 @@ class Database {
   std::string path_;
   Access access_;
   Remedies remedies_;
+  std::unique_ptr<OpenFile> file_;  ///< outlives the handle
   std::unique_ptr<sqlite3, Close> handle_;
 };
 

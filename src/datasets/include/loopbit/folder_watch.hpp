@@ -10,17 +10,16 @@
 
 namespace loopbit {
 
-/// Tells which images have come to a folder, those that were there at first included.
+/// Reports the images of a folder, first the existing ones, then new ones as they arrive.
 class FolderWatch {
  public:
-  /// Throws Error (kind input) if `folder` is no folder.
+  /// Throws Error (kind input) if `folder` is not a folder.
   explicit FolderWatch(const std::string& folder);
 
-  /// Paths of the images that are new since the last call, in natural order. A file is given when
-  /// neither its size nor its time has changed between two calls, and again only when one has.
-  /// Hidden files and files that are no images by their extension are passed over, so that one may
-  /// be written as `.name` and renamed. Throws Error (kind input) if the folder cannot be read any
-  /// more.
+  /// Paths of the images that are new since the last call, in natural order. A file is reported
+  /// when its size and its time have not changed between two calls, and again only after a change.
+  /// Hidden files and files without an image extension are skipped, so a writer may write `.name`
+  /// and rename it. Throws Error (kind input) if the folder can no longer be read.
   std::vector<std::string> arrived();
 
  private:

@@ -7,7 +7,7 @@
 
 namespace loopbit {
 
-/// The frames first..last, all of them, show the place that frame `query` shows.
+/// All frames first..last show the place of frame `query`.
 struct PlaceRun {
   int query = 0;
   int first = 0;
@@ -16,36 +16,36 @@ struct PlaceRun {
   bool operator==(const PlaceRun&) const = default;
 };
 
-/// What is true about a sequence, in the numbers of its frames. A query may be in several runs.
+/// The ground truth of a sequence, counted in its frames. A query may be in several runs.
 struct GroundTruth {
   std::vector<PlaceRun> same_place = {};  ///< true earlier places
-  std::vector<PlaceRun> near_place = {};  ///< a match here is not false, nor right by this alone
+  std::vector<PlaceRun> near_place = {};  ///< not wrong; right only if also a true place
   std::vector<int> ignored = {};          ///< queries that are not scored
-  /// Frames of which nobody knows what they show: not scored, and no match with them is false.
+  /// Frames of unknown places: not scored as queries, and never wrong as matches.
   std::vector<int> unknown = {};
-  /// Of the sequence's frames every so-many-th was read: the k-th of them is frame k * every here.
+  /// Only every N-th frame of the sequence was read. Frame k of the run is frame k * every here.
   int every = 1;
-  int frames = 0;  ///< how many frames of the sequence are told of; 0 = not known
+  int frames = 0;  ///< number of frames that the truth covers; 0 = unknown
 };
 
-/// Reads rows of `query,first,last` or, all of them, `query,match` (spaces do for commas, too) with
-/// 0 <= first <= last < query: places are earlier frames. Blank lines, `#` comments and a first row
-/// of names, in this order, are passed over. Throws Error (kind input) that names file and line for
-/// anything else.
+/// Reads rows of `query,first,last`, or rows of `query,match`, separated by commas or spaces, with
+/// 0 <= first <= last < query: places are earlier frames. Blank lines, `#` comments and a header
+/// row in this order are skipped; another header is refused if there are no rows. Throws Error
+/// (kind input) with file and line for anything else.
 std::vector<PlaceRun> read_place_runs(const std::string& path);
 
-/// Reads the frame that begins each row; what follows a comma is a remark. Errors as above.
+/// Reads the frame at the start of each row; text after a comma is a remark. Errors as above.
 std::vector<int> read_frame_list(const std::string& path);
 
 /// Throws Error (kind option) if `every` is less than 1: see GroundTruth::every.
 void check_every(int every);
 
-/// What `truth`, of all frames, says of every `every`-th (1 = all), in the numbers of the frames
-/// read. A place none of whose frames was read is lost; GroundTruth::every loses nothing. Throws
-/// as check_every() does.
+/// The part of `truth` for every N-th frame (1 = all), numbered by the frames read. Places without
+/// a frame that was read are lost; GroundTruth::every keeps them. Throws as check_every() does.
 GroundTruth every_nth(const GroundTruth& truth, int every);
 
-/// Writes rows of `query,first,last` under a line of `comment`. Throws Error (kind output).
+/// Writes a comment line and rows of `query,first,last`, or their header if there are none. Throws
+/// Error (kind output).
 void write_place_runs(const std::string& path, const std::string& comment,
                       const std::vector<PlaceRun>& runs);
 

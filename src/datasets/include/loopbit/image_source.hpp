@@ -11,12 +11,12 @@
 
 namespace loopbit {
 
-/// One image of a sequence, or the reason why there is none.
+/// One image of a sequence, or the reason why it is missing.
 struct Frame {
-  std::string name;                   ///< name in its folder or list, or position, for messages
-  std::optional<double> timestamp_s;  ///< seconds, where the data set has times; see open_source
+  std::string name;                   ///< name in its folder or list, or its position
+  std::optional<double> timestamp_s;  ///< seconds, if the data set has times; see open_source
   cv::Mat image;                      ///< 8- or 16-bit, grey, BGR or BGRA; empty if unreadable
-  std::string error;                  ///< empty, or one sentence on why the image is unreadable
+  std::string error;  ///< empty, or a sentence that says why the image is unreadable
 };
 
 /// A sequence of images, read in order. Not thread-safe; one reader at a time.
@@ -25,49 +25,58 @@ class ImageSource {
   virtual ~ImageSource() = default;
 
   /// Reads the next frame. False at the end. A damaged image is a frame with `error` set, not an
-  /// exception and not the end. A video that is cut off ends early, and a camera ends when it is
-  /// unplugged: no backend tells these from the end. frame.image shares no memory with frames
-  /// read before.
+  /// exception and not the end. A camera ends when it is unplugged. frame.image shares no memory
+  /// with frames read before.
   virtual bool next(Frame& frame) = 0;
 
-  /// Passes over the next frame without decoding it. False at the end.
+  /// Skips the next frame without decoding it. False at the end.
   virtual bool skip() = 0;
 
-  /// How many frames there are in all, where that is known before reading them. Exact for images;
-  /// for a video an estimate from its header, so read until next() says false.
+  /// The total number of frames, if it is known before reading them. Exact for images; an estimate
+  /// from the header for a video, so read until next() returns false.
   [[nodiscard]] virtual std::optional<std::size_t> size() const = 0;
 
-  /// One line for people and for run.json, such as "KITTI odometry sequence, image_0".
+  /// One line that describes the source, such as "KITTI odometry sequence, image_0".
   [[nodiscard]] virtual std::string description() const = 0;
+
+  /// When the end was reached: one sentence if the input ends before its time, such as a video that
+  /// is cut off. Empty if it does not, before the end, and where nothing tells.
+  [[nodiscard]] virtual std::string early_end() const { return {}; }
 };
 
-/// Opens a sequence, told by what is there:
+/// Larger images are not read, unless the caller allows it. Decoding takes up to 8 bytes per pixel.
+inline constexpr int kMaxMegapixels = 100;
+
+/// Opens a sequence. Its kind is detected:
 ///  - `camera:N`: a camera attached to this machine (N from 0 to 99), no times;
-///  - a folder with `image_0` or `image_2`: a KITTI odometry sequence (times.txt where present);
+///  - a folder with `image_0` or `image_2`: a KITTI odometry sequence (times.txt if present);
 ///  - a folder with `mav0/cam0/data.csv`, or that `mav0` or `cam0` itself: EuRoC;
 ///  - a folder with `rgb.txt`: TUM RGB-D;
 ///  - any other folder: its images in natural order (2.png before 10.png), told by extension;
 ///    hidden files and sub-folders are passed over;
 ///  - a .txt or .csv file: a list, one image a line, relative to the file or to a folder `images`
-///    beside it, `#` for comments;
+///    beside it, `#` for comments; or names that NUL bytes end, as `find -print0` writes them;
 ///  - an image file: that one image;
 ///  - any other file: a video, its times counted from its first frame.
 /// Throws Error (kind input) if nothing is there, no image is found or a list is malformed, and
-/// Error (kind option) if N is no camera number. Listed images are not looked at before next().
-std::unique_ptr<ImageSource> open_source(const std::string& input);
+/// Error (kind option) if N is no camera number. Listed images are not looked at before next(). An
+/// image of more than `max_megapixels` (at least 1) is not decoded, but unreadable, and a video of
+/// them is refused. Formats: PNG, JPEG, BMP, PBM, PGM, PPM, TIFF and WebP; videos as OpenCV reads.
+std::unique_ptr<ImageSource> open_source(const std::string& input,
+                                         int max_megapixels = kMaxMegapixels);
 
-/// Every `every`-th frame of `source` (1 = all), and no more than `limit` frames (0 = no limit).
-/// Frames left out are skipped, not decoded. Throws Error (kind option) if `every` is 0.
+/// Every N-th frame of `source` (1 = all), and at most `limit` frames (0 = no limit). Other frames
+/// are skipped, not decoded. Throws Error (kind option) if `every` is 0.
 std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source, std::size_t every,
                                        std::size_t limit);
 
-/// How many frames `source`, opened from `input`, has in all, where that is sure: of a folder. A
-/// video says about how many.
+/// The total number of frames of `source`, opened from `input`, if it is exact, as for a folder.
+/// None for a video, which has only an estimate.
 std::optional<std::size_t> exact_size(const ImageSource& source, const std::string& input);
 
-/// `source`, read ahead by a thread of its own, at most `depth` frames (at least 1). Frames and
-/// their order are the same; decoding overlaps with what is done with them. Throws Error (kind
-/// option) if `depth` is 0.
+/// Reads `source` ahead in its own thread, at most `depth` frames (at least 1). The frames and
+/// their order are the same; decoding overlaps with processing. Throws Error (kind option) if
+/// `depth` is 0.
 std::unique_ptr<ImageSource> prefetch(std::unique_ptr<ImageSource> source, std::size_t depth);
 
 }  // namespace loopbit

@@ -8,33 +8,32 @@
 
 namespace loopbit {
 
-/// What a detector, any detector, says about a frame.
+/// A match reported by any detector.
 struct ReportedMatch {
   int query = 0;
   int match = 0;
-  double score = 0;     ///< larger is surer
+  double score = 0;     ///< larger means more certain
   bool is_loop = true;  ///< the detector's own decision
 
   bool operator==(const ReportedMatch&) const = default;
 };
 
-/// What a detector says about a sequence.
+/// The matches of a detector on a sequence.
 struct MatchList {
   std::vector<ReportedMatch> matches = {};  ///< in the order of the file
-  /// One a frame; empty where frames are not listed.
+  /// One per frame; empty if frames are not listed.
   std::vector<std::optional<double>> times_s = {};
-  /// Queries whose accepted match is a frame of another recording, which truth does not tell of.
+  /// Queries whose accepted match is in another recording, which truth does not cover.
   std::vector<int> elsewhere = {};
 };
 
-/// Reads a CSV file of matches. A first row of names gives the columns their meaning: `query` or
-/// `frame`, `match`, `score`, and of loopbit's own loops.csv `status` (`loop` = accepted; other
-/// rows with a match are candidates that were rejected) and `timestamp`; other columns are passed
-/// over. Without names rows are `query,match` or `query,match,score`. Where there is no score all
-/// matches have score 1. Rows with an empty match say that the frame has none. `#` begins a
-/// comment. A match is an earlier frame; one `S:F` is frame F of another recording, S, in a file
-/// with a column `frame`. If there is a column `frame`, every frame must have its row, in order,
-/// from 0. Throws Error (kind input) that names file and line.
+/// Reads a CSV file of matches. A header row names the columns: `query` or `frame`, `match`,
+/// `score`, and in loopbit's loops.csv `status` (`loop` = accepted; other rows with a match are
+/// rejected candidates) and `timestamp`. Other columns are skipped. Without a header, rows are
+/// `query,match` or `query,match,score`. Without scores all matches have score 1. A row with an
+/// empty match is a frame without a match. `#` begins a comment. A match is an earlier frame. In a
+/// file with a column `frame`, `S:F` is frame F of another recording S, and every frame must have
+/// its row, in order, from 0. Throws Error (kind input) with file and line.
 MatchList read_match_list(const std::string& path);
 
 }  // namespace loopbit

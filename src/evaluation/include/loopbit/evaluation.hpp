@@ -15,35 +15,35 @@
 namespace loopbit {
 
 struct EvaluationOptions {
-  /// A match so near to a true earlier place is right, too; in frames of the truth's sequence.
+  /// A match within this distance of a true earlier place is also right; in frames of the truth.
   int tolerance_frames = 0;
-  std::string protocol = {};  ///< its name, for the record; empty if it has none
+  std::string protocol = {};  ///< name of the protocol, for the record; may be empty
 };
 
-/// What truth says about one reported match.
+/// The judgement of one reported match.
 enum class Judgement {
   right,      ///< a true earlier place, or within the tolerance of one
-  tolerated,  ///< near enough not to be wrong: listed as near_place
-  wrong,      ///< neither
+  tolerated,  ///< listed as near_place: neither right nor wrong
+  wrong,      ///< any other match
 };
 
-/// Ground truth, made ready to judge many matches. Queries and matches have the numbers of the
-/// frames read, see GroundTruth::every. Cost of a question: the runs of its query.
+/// Ground truth, indexed to judge many matches. Queries and matches are numbered by the frames
+/// read; see GroundTruth::every. Cost per call: linear in the runs of the query.
 class Judge {
  public:
   explicit Judge(const GroundTruth& truth, const EvaluationOptions& options = {});
 
   [[nodiscard]] Judgement judge(int query, int match) const;
-  /// Whether truth lists the very frame `match` for `query`, whatever the tolerance.
+  /// Whether truth lists exactly the frame `match` for `query`. The tolerance is ignored.
   [[nodiscard]] bool is_true_pair(int query, int match) const;
-  /// Whether `query` is scored and a match of it can be right: whether it is a revisit.
+  /// Whether `query` is a revisit: it is scored, and it has a true earlier place.
   [[nodiscard]] bool is_positive(int query) const;
   [[nodiscard]] bool is_ignored(int query) const;
 
  private:
   using RunsByQuery = std::unordered_map<std::int64_t, std::vector<PlaceRun>>;
 
-  /// Calls holds(run) with the runs of `query` until one does.
+  /// Whether holds(run) is true for any run of `query`.
   template <typename Holds>
   [[nodiscard]] bool any_run(const RunsByQuery& runs, int query, const Holds& holds) const;
   [[nodiscard]] bool lists(const RunsByQuery& runs, int query, int match,
@@ -58,24 +58,24 @@ class Judge {
   std::unordered_set<std::int64_t> unknown_;
 };
 
-/// How far the true share may be from the observed one.
+/// A confidence interval.
 struct Interval {
   double low = 0;
   double high = 1;
 };
 
-/// Wilson's interval (1927) for the share of `hits` in `trials`, at 95 %: also right where all or
-/// none hit. [0, 1] without trials.
+/// Wilson's interval (1927) for the share of `hits` in `trials`, at 95 %. It is valid even if all
+/// or none of the trials hit. [0, 1] without trials.
 [[nodiscard]] Interval wilson_interval(std::int64_t hits, std::int64_t trials);
 
-/// What the decisions of a detector come to, query by query. A query's best-scored accepted match
-/// speaks for it (the first of equals).
+/// Counts of a detector's decisions, per query. Only the accepted match with the highest score of a
+/// query counts (the first of equal ones).
 struct DecisionCounts {
-  int positives = 0;  ///< queries that are scored and have a true earlier place that was read
+  int positives = 0;  ///< scored queries with a true earlier place that was read
   int right = 0;
   int tolerated = 0;
   int wrong = 0;
-  int ignored = 0;  ///< queries left out of the score
+  int ignored = 0;  ///< queries that are not scored
 
   /// right / positives; 0 without positives.
   [[nodiscard]] double recall() const;
@@ -83,12 +83,12 @@ struct DecisionCounts {
   [[nodiscard]] double precision() const;
 };
 
-/// What they come to pair by pair: every accepted match counts, and so does every true pair of
-/// frames, however many a query has.
+/// Counts of a detector's decisions, per pair of frames. Every accepted match counts, and every
+/// true pair, even several per query.
 struct PairCounts {
   std::int64_t positives = 0;  ///< true pairs
-  std::int64_t found = 0;      ///< of those the accepted ones
-  std::int64_t right = 0;  ///< accepted ones that are true or within the tolerance of a true one
+  std::int64_t found = 0;      ///< true pairs that were accepted
+  std::int64_t right = 0;  ///< accepted pairs that are true or within the tolerance of a true pair
   std::int64_t wrong = 0;
 
   /// found / positives; 0 without positives.
@@ -97,7 +97,7 @@ struct PairCounts {
   [[nodiscard]] double precision() const;
 };
 
-/// All queries whose best match, accepted or not, has at least this score.
+/// Counts over all queries whose best match, accepted or not, has at least this score.
 struct CurvePoint {
   double score = 0;
   int right = 0;
@@ -106,27 +106,28 @@ struct CurvePoint {
   double recall = 0;
 };
 
-/// How good a detector's matches are; see docs/evaluation.md.
+/// The score of a detector's matches; see docs/evaluation.md.
 struct Evaluation {
   EvaluationOptions options;
-  DecisionCounts decision;  ///< as shipped
-  PairCounts pairs;         ///< as shipped
-  /// One point for each score that occurs, from the highest: equal scores are accepted all or none.
+  DecisionCounts decision;  ///< with the detector's own threshold
+  PairCounts pairs;         ///< with the detector's own threshold
+  /// One point per distinct score, from the highest. Equal scores are accepted together.
   std::vector<CurvePoint> curve;
   double recall_at_full_precision = 0;
-  /// The lowest score with no wrong match at it or above; none if even the highest has one.
+  /// The lowest score with no wrong match at or above it; none if the highest score is wrong.
   std::optional<double> score_at_full_precision;
-  double average_precision = 0;            ///< sum of precision times gain of recall over `curve`
+  double average_precision = 0;            ///< sum of precision x gain of recall over `curve`
   std::vector<ReportedMatch> wrong_loops;  ///< accepted, by query
   std::vector<int> missed;                 ///< positive queries without a right loop
 };
 
-/// Scores `list` against `truth`. Queries past the end of a list that has one (times_s) do not
-/// count, nor those answered elsewhere (MatchList::elsewhere). Cost: sorting the matches.
+/// Scores `list` against `truth`. Queries after the end of the list do not count if the end is
+/// known (times_s), nor do queries matched elsewhere (MatchList::elsewhere). Cost: sorting the
+/// matches.
 Evaluation evaluate(const MatchList& list, const GroundTruth& truth,
                     const EvaluationOptions& options = {});
 
-/// As JSON. `full` adds the curve, the wrong loops and the missed queries.
+/// The evaluation as JSON. `full` adds the curve, the wrong loops and the missed queries.
 std::string to_json(const Evaluation& evaluation, bool full);
 
 }  // namespace loopbit

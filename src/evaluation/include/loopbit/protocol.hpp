@@ -11,12 +11,12 @@
 
 namespace loopbit {
 
-/// A way of scoring that others have published with: its name fixes every setting, so that numbers
-/// can be set beside theirs. Numbers of different protocols must not be mixed.
+/// A published scoring protocol. Its name fixes every setting, so that numbers can be compared with
+/// published ones. Numbers of different protocols must not be mixed.
 struct Protocol {
   std::string_view name;
   std::string_view help;  ///< one line
-  TruthKind truth_kind;   ///< what it is defined on
+  TruthKind truth_kind;   ///< kind of truth that it requires
   TruthOptions truth;     ///< all but `variable`
   int tolerance_frames;
 
@@ -25,10 +25,10 @@ struct Protocol {
   }
 };
 
-/// All of them; docs/evaluation.md tells what each counts.
+/// All protocols; docs/evaluation.md describes them.
 [[nodiscard]] std::span<const Protocol> protocols();
 
-/// Throws Error (kind option) that lists the names if there is none such.
+/// Throws Error (kind option) that lists the known names if `name` is not one of them.
 [[nodiscard]] const Protocol& find_protocol(const std::string& name);
 
 }  // namespace loopbit

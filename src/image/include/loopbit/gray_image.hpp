@@ -6,14 +6,13 @@
 
 namespace loopbit {
 
-/// Images narrower or lower than this hold too little to recognise a place by.
+/// Smaller images have too little content to recognise a place.
 inline constexpr int kMinImageSidePx = 32;
 
 /// Throws Error (kind input) unless `image` has 2 dimensions and at least 32 x 32 pixels.
 void check_size(const cv::Mat& image);
 
-/// The grey levels between which all but the darkest and the brightest thousandth of a 16-bit image
-/// lie.
+/// The range of grey levels of a 16-bit image, without its darkest and its brightest thousandth.
 struct GrayRange {
   int dark = 0;
   int bright = 65535;  ///< more than `dark`
@@ -22,12 +21,12 @@ struct GrayRange {
 /// `image`: 16-bit grey, not empty.
 GrayRange gray_range(const cv::Mat1w& image);
 
-/// The 8-bit grey picture of any camera image, which all parts work on.
+/// Converts a camera image to the 8-bit grey image that all parts use.
 ///
 /// `image`: 8- or 16-bit unsigned, grey, BGR or BGRA, at least 32 x 32. 16-bit images are stretched
-/// so that their darkest and brightest thousandth meet 0 and 255: a 12-bit camera or a thermal one
-/// uses a small part of the 16 bits. An 8-bit grey image is returned as it is, without a copy.
-/// Throws Error (kind input) that names what was found, for anything else.
+/// so that their darkest and brightest thousandth become 0 and 255, because 12-bit and thermal
+/// cameras use a small part of the 16 bits. An 8-bit grey image is returned without a copy. Throws
+/// Error (kind input) for anything else, and names what was found.
 cv::Mat1b gray_image(const cv::Mat& image);
 
 }  // namespace loopbit

@@ -60,8 +60,10 @@ struct MapImages {
 /// Makes the bytes of a small JPEG file of an image; see picture_jpeg.hpp.
 using EncodeImage = std::function<std::vector<unsigned char>(const cv::Mat&)>;
 
-/// Features that were read lately are kept up to this many bytes, some 5,000 places.
-inline constexpr std::size_t kFeatureCacheBytes = std::size_t{256} << 20U;
+/// Recently used features stay in memory, up to this many MiB by default. The cache changes no
+/// result, only how often features are read from the file again. 64 MiB hold about 1,400 places, or
+/// minutes of driving, and are a small part of a robot's memory.
+inline constexpr std::size_t kMapCache_mb = 64;
 
 /// A map on disk, to be read, also while it is being written: a reader sees what was committed when
 /// it looked. docs/format.md describes the file. What is damaged is left out, never guessed: every
@@ -72,7 +74,7 @@ class MapReader : public MapStorage {
 
   /// Throws Error (kind input) if there is no map, it is of a newer version, or it is damaged where
   /// its tables are listed. Reads the sessions only.
-  explicit MapReader(const std::string& path);
+  explicit MapReader(const std::string& path, std::size_t cache_mb = kMapCache_mb);
   ~MapReader() override;
   MapReader(const MapReader&) = delete;
   MapReader& operator=(const MapReader&) = delete;
@@ -127,26 +129,29 @@ class MapReader : public MapStorage {
 ///
 /// Frames are handed to a thread that commits them in batches of 32 or, at the latest, after a
 /// second; what is committed survives SIGKILL and the loss of power. add() waits only where that
-/// thread is 256 frames behind. Features of the latest places are in memory, see
-/// kFeatureCacheBytes.
+/// thread is 256 frames behind. In a forked child every call throws Error
+/// (kind option).
 class MapWriter : public MapStorage {
  public:
   /// Creates or continues the map at `path`; `name` says what the session reads. Throws Error
   /// (kind output) if the map has a writer or cannot be written, (kind option) if it was made with
   /// other settings of binary_content or surf, (kind input) as MapReader does. A session without
-  /// frames leaves no trace.
+  /// frames leaves no trace: nothing is written to a map before its first frame.
   ///
   /// `encode_image`: if given, an image of each place is kept. It is called on that thread, with a
   /// copy of the image as halved_to_picture() makes it, which costs add() some 0.1 ms; nothing is
   /// kept where it gives no bytes, and what it throws, later calls throw.
   MapWriter(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
-            EncodeImage encode_image = {});
+            EncodeImage encode_image = {}, std::size_t cache_mb = kMapCache_mb);
   /// Saves as finish() does, if it was not called, and swallows its error.
   ~MapWriter() override;
   MapWriter(const MapWriter&) = delete;
   MapWriter& operator=(const MapWriter&) = delete;
   MapWriter(MapWriter&&) = delete;
   MapWriter& operator=(MapWriter&&) = delete;
+
+  /// Throws Error (kind option) in a forked child. Never waits.
+  void check_process() const;
 
   /// The number of the session that is written.
   [[nodiscard]] int session() const;
@@ -178,6 +183,7 @@ class MapWriter : public MapStorage {
 
  private:
   class Impl;
+  [[nodiscard]] Impl& impl() const;
   std::unique_ptr<Impl> impl_;
 };
 

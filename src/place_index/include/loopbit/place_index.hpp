@@ -14,18 +14,18 @@
 
 namespace loopbit {
 
-/// A place's number in its map: 0, 1, 2, ... in the order of adding.
+/// Number of a place in its map: 0, 1, 2, ... in the order of adding.
 using PlaceId = std::int32_t;
 
 /// A place that looks like the query.
 struct Candidate {
   PlaceId place = 0;
-  double similarity = 0;  ///< xi, the best over the tolerated shifts, in (0, 1]
+  double similarity = 0;  ///< xi, the maximum over the tolerated shifts, in (0, 1]
 
   bool operator==(const Candidate&) const = default;
 };
 
-/// No two centres M of contents are farther apart, px.
+/// Upper bound of the distance between two centres M of contents, px.
 inline constexpr double kMaxCenterDistance_px = 90.0;
 
 struct RetrievalOptions {
@@ -39,24 +39,24 @@ struct RetrievalOptions {
   static constexpr auto fields() {
     using S = RetrievalOptions;
     return std::tuple{
-        Field{"max_candidates", &S::max_candidates, 1, 1000, "look-alike places that are verified"},
+        Field{"max_candidates", &S::max_candidates, 1, 1000, "similar places that are verified"},
         Field{"min_similarity", &S::min_similarity, 0.0, 1.0,
-              "smallest similarity xi of a candidate; 0 takes every place that shares a pixel"},
+              "smallest similarity xi of a candidate; 0 accepts every place that shares a pixel"},
         Field{"shift_tolerance_columns", &S::shift_tolerance_columns, 0, 32,
-              "contents are compared shifted by up to so many of 64 columns, in steps of 2"},
+              "contents are compared at shifts of up to this many of 64 columns, in steps of 2"},
         Field{"min_spacing", &S::min_spacing, 1, 1000,
-              "places that look alike are at least so many apart; also how far beside a followed "
-              "way or the best candidate places are looked at"},
+              "smallest distance between candidates, in places; also the range of places examined "
+              "around a followed way or the best candidate"},
         Field{"max_count_difference", &S::max_count_difference, 0, 4096,
-              "a candidate's |O| differs from the query's by at most so many pixels; 4096 = any"},
+              "largest difference between |O| of candidate and query, pixels; 4096 = no limit"},
         Field{"max_center_distance_px", &S::max_center_distance_px, 0.0, kMaxCenterDistance_px,
-              "a candidate's centre M lies within so many pixels of the query's; 90 = anywhere"}};
+              "largest distance between the centres M of candidate and query, px; 90 = no limit"}};
   }
 };
 
-/// What one query looked at.
+/// The work of one query.
 struct RetrievalWork {
-  std::int64_t coarse_stretches = 0;  ///< of 32 consecutive places, bounded coarsely
+  std::int64_t coarse_stretches = 0;  ///< stretches of 32 consecutive places with coarse bounds
   /// Stretches of 32, 16, 8 and 2 consecutive places whose finer bounds were computed.
   std::array<std::int64_t, 4> stretches{};
   std::int64_t contents = 0;  ///< places whose contents were compared
@@ -64,22 +64,22 @@ struct RetrievalWork {
 
 class PlaceStore;
 
-/// The binary contents of all places, and the question which of them look like a query.
+/// Stores the binary contents of all places, and finds those most similar to a query.
 ///
-/// One thread may add while any number of others ask: a query sees the places that were there when
-/// it began, and contents never move. Memory: 610 bytes a place, 512 of them its content.
+/// One thread may add while any number of other threads query. A query sees the places that existed
+/// when it began; contents never move. Memory: 610 bytes per place, 512 of them its content.
 class PlaceIndex {
  public:
-  /// All in memory.
+  /// Keeps everything in memory.
   PlaceIndex();
-  /// The contents in a file without a name in `scratch_folder`, mapped to memory, which holds what
-  /// the bounds need, 98 bytes a place. The file is gone when the index is. Throws Error (kind
-  /// output) if it cannot be made.
+  /// Keeps the contents in an unnamed, memory-mapped file in `scratch_folder`. The bounds stay in
+  /// memory, 98 bytes per place. The file disappears with the index. Throws Error (kind output) if
+  /// it cannot be created.
   explicit PlaceIndex(const std::string& scratch_folder);
   ~PlaceIndex();
   PlaceIndex(const PlaceIndex&) = delete;
   PlaceIndex& operator=(const PlaceIndex&) = delete;
-  /// An index moved from may only be assigned to or destroyed.
+  /// A moved-from index may only be assigned to or destroyed.
   PlaceIndex(PlaceIndex&&) noexcept;
   PlaceIndex& operator=(PlaceIndex&&) noexcept;
 
@@ -88,23 +88,22 @@ class PlaceIndex {
   /// contents is full.
   PlaceId add(const BinaryContent& content);
 
-  /// Takes the memory that the next place needs, so that the next add() does not throw: for who
-  /// keeps something else in step with the places. Throws as add() does.
+  /// Allocates the memory for the next place, so that the next add() does not throw. For callers
+  /// that update other state atomically. Throws as add() does.
   void reserve_next();
 
   [[nodiscard]] PlaceId size() const;
 
-  /// Valid as long as the index. Throws std::out_of_range unless 0 <= place < size().
+  /// Valid for the lifetime of the index. Throws std::out_of_range unless 0 <= place < size().
   [[nodiscard]] const BinaryContent& content(PlaceId place) const;
 
-  /// The most similar places among those numbered below `end`, best first; of equals, the earlier
-  /// place first. Similarity is xi (Wang et al. 2019, section III-B), the best over all shifts of
-  /// the query within the tolerance; |O1| and |O2| are counted before shifting. Going down that
-  /// order, a place is passed over if it lies closer than `min_spacing` to one already taken, or
-  /// beyond the limits of count and centre.
-  /// Exact, as a full scan would answer: an empty content has no candidates and is none. Cost:
-  /// bounds of stretches of the past, and a look at the places that these leave; see
-  /// docs/retrieval.md. `work`, if not null, is told what was looked at.
+  /// The most similar places among those numbered below `end`, best first; of equal ones, the
+  /// earlier place first. Similarity is xi (Wang et al. 2019, section III-B), the maximum over all
+  /// shifts of the query within the tolerance; |O1| and |O2| are counted before shifting. Going
+  /// down this order, a place is skipped if it is closer than `min_spacing` to one already taken,
+  /// or beyond the limits of count and centre. The result equals that of a full scan. Empty
+  /// contents neither match nor are matched. Cost: bounds of all stretches, and the contents that
+  /// they cannot exclude; see docs/retrieval.md. `work`, if not null, receives the amount of work.
   [[nodiscard]] std::vector<Candidate> query(const BinaryContent& content, PlaceId end,
                                              const RetrievalOptions& options = {},
                                              RetrievalWork* work = nullptr) const;

@@ -14,13 +14,13 @@ export type ZoomAxes = "none" | "x" | "xy";
 const length = ([low, high]: Range) => high - low;
 const kDeepestZoom = 2000;
 
-/** `range` widened to `wanted` about its middle. */
+/** `range` widened to the length `wanted`, with the same centre. */
 function widened([low, high]: Range, wanted: number): Range {
   const middle = (low + high) / 2;
   return [middle - wanted / 2, middle + wanted / 2];
 }
 
-/** Widened so that a unit is equally long on both axes of a plot of `width` x `height` pixels. */
+/** Widens the bounds so that both axes of a `width` x `height` plot have the same scale. */
 export function withEqualAxes(bounds: Bounds, width: number, height: number): Bounds {
   const unitsPerPixel = Math.max(length(bounds.x) / width, length(bounds.y) / height);
   return {
@@ -36,13 +36,13 @@ function zoomedRange(range: Range, home: Range, factor: number, about: number): 
   return kept([about - (about - range[0]) * scale, about + (range[1] - about) * scale], home);
 }
 
-/** Moved back to where `home` is. */
+/** Moves the bounds back into `home`. */
 function kept([low, high]: Range, home: Range): Range {
   const back = Math.max(0, home[0] - low) - Math.max(0, high - home[1]);
   return [low + back, high + back];
 }
 
-/** `factor` > 1 shows less, larger; `about` stays where it is. */
+/** Zooms in for `factor` > 1; the point `about` stays fixed. */
 export function zoomed(
   view: Bounds,
   home: Bounds,
@@ -74,7 +74,7 @@ export const middle = (bounds: Bounds) => ({
   y: (bounds.y[0] + bounds.y[1]) / 2,
 });
 
-/** Some air around what is drawn. */
+/** Adds a margin around the content. */
 export function padded([low, high]: Range, share: number): Range {
   const air = (high - low || 1) * share;
   return [low - air, high + air];

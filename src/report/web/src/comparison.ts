@@ -93,7 +93,7 @@ function bestOf(column: Column, models: readonly RunModel[]): number | null {
   return column.best === "high" ? Math.max(...values) : Math.min(...values);
 }
 
-/** One row a run; the header sorts, the name of a run shows it. */
+/** One row per run. A click on the header sorts; a click on a run shows it. */
 export class Comparison {
   readonly element: HTMLElement;
   private readonly body = html("tbody");
@@ -108,8 +108,7 @@ export class Comparison {
       const sort = button({}, () => this.sortBy(column), column.name);
       this.heads.set(column, html("th", { scope: "col" }, sort));
     }
-    const what =
-      "The runs side by side; the best of each column is bold. Choose a run to see it below.";
+    const what = "All runs. The best value of each column is bold. Select a run to show it below.";
     const head = html("tr", {}, html("th", { scope: "col" }, "run"), ...this.heads.values());
     const parts = [html("caption", {}, what), html("thead", {}, head), this.body];
     this.element = html(
@@ -132,7 +131,7 @@ export class Comparison {
     );
   }
 
-  /** The best comes first; the second time last. */
+  /** Sorts by a column, best first; a second call reverses the order. */
   private sortBy(column: Column): void {
     const first = column.best === "low" ? 1 : -1;
     const isAgain = this.sorted?.column === column && this.sorted.direction === first;
@@ -140,7 +139,7 @@ export class Comparison {
     this.show();
   }
 
-  /** The indices of the runs as they are shown: those without a value last, either way. */
+  /** The indices of the runs in display order. Runs without a value are always last. */
   private order(): number[] {
     const indices = this.models.map((_, index) => index);
     const sorted = this.sorted;

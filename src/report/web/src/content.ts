@@ -21,7 +21,7 @@ export function contentOf(base64: string): Content {
 
 export const countOf = (content: Content): number => content.reduce((sum, bit) => sum + bit, 0);
 
-/** The content moved `columns` to the right (left if negative); what leaves the map is lost. */
+/** The content shifted `columns` to the right (left if negative); other pixels are dropped. */
 export function shifted(content: Content, columns: number): Content {
   const moved = new Uint8Array(content.length);
   for (let i = 0; i < content.length; ++i) {
@@ -36,13 +36,16 @@ export interface Overlap {
   similarity: number;
   both: number;
   larger: number;
-  /** Columns by which `a` was moved to the right; the smallest of equally good ones. */
+  /** Columns by which `a` was shifted to the right; the smallest of equally good ones. */
   shift: number;
-  /** `a` so moved. */
+  /** `a` shifted by `shift`. */
   moved: Content;
 }
 
-/** Wang et al. 2019, section III-B; |A| is counted before shifting, by even numbers of columns and by the tolerance. */
+/**
+ * Wang et al. 2019, section III-B. Shifts are even numbers of columns and the tolerance itself; |A|
+ * is counted before shifting.
+ */
 export function overlapOf(a: Content, b: Content, tolerance: number): Overlap {
   const larger = Math.max(countOf(a), countOf(b));
   let best: Overlap = { similarity: 0, both: -1, larger, shift: 0, moved: a };

@@ -50,7 +50,7 @@ export function setPressed(target: Element, pressed: boolean): void {
   target.setAttribute("aria-pressed", String(pressed));
 }
 
-/** Renews what is in `container`; the button that had the focus gives it to its successor. */
+/** Replaces the content of `container`, and keeps the focus on the same button. */
 export function renew(container: HTMLElement, children: readonly Node[]): void {
   const buttons = () => [...container.querySelectorAll("button")];
   const at = buttons().indexOf(document.activeElement as HTMLButtonElement);

@@ -3,7 +3,7 @@
 
 import type { CurvePoint, Evaluation } from "./report_data.ts";
 
-/** Shares, null where they are shares of nothing. */
+/** Shares; null if the denominator is 0. */
 export interface Figures {
   recall: number | null;
   precision: number | null;

@@ -17,12 +17,12 @@ function isOffered(filter: Filter, frames: number, hasTruth: boolean): boolean {
   return filter === "all" || filter === "loops" || hasTruth;
 }
 
-/** Which frames the arrow keys walk. */
+/** The filter of the frames that the arrow keys visit. */
 export class Filters implements View {
   readonly element = html("div", {
     class: "filters",
     role: "group",
-    "aria-label": "Frames to walk through",
+    "aria-label": "Frames to show",
   });
   private readonly buttons = new Map<Filter, HTMLButtonElement>();
   private readonly counts = new Map<Filter, HTMLElement>();

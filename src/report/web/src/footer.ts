@@ -10,10 +10,10 @@ import type { View } from "./view.ts";
 
 type Options = RunRecord["options"];
 
-/** What a repeated run is written to: the first one stays as it is. */
+/** Output folder of a repeated run, so that the first one is kept. */
 const kNewFolder = "again";
 
-/** As one would type it: quoted where the shell would split or change it. */
+/** Quotes a word for the shell if needed. */
 const quoted = (text: string) =>
   /^[\w@%+=:,./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 
@@ -27,7 +27,7 @@ function flat(options: Options): [string, string][] {
   );
 }
 
-/** Those that are not as in `defaults`. */
+/** The settings that differ from `defaults`. */
 function changed(options: Options, defaults: Options): [string, string][] {
   const usual = new Map(flat(defaults));
   return flat(options).filter(([name, value]) => usual.get(name) !== value);
@@ -51,18 +51,18 @@ function commandOf(given: readonly string[]): string {
   return ["loopbit", ...words, ...given.slice(end)].map(quoted).join(" ");
 }
 
-/** What there is to say of a run that no command made. */
+/** Describes a run that was not started by a command. */
 function inputOf({ arguments: given, input }: RunRecord): string {
   const who = given
-    ? "The run was made by the library, not by the command."
+    ? "The run was started through the library, not by the command."
     : "The record does not say how the run was started.";
   const parts = [`${input.path} (${input.description})`];
-  if (input.every > 1) parts.push(`of every ${input.every} frames one`);
+  if (input.every > 1) parts.push(`one of every ${input.every} frames`);
   if (input.limit > 0) parts.push(`at most ${format.counted(input.limit, "frame")}`);
-  return `${who} Its input: ${parts.join(", ")}.`;
+  return `${who} Input: ${parts.join(", ")}.`;
 }
 
-/** How the run came about, and how to repeat it. */
+/** The origin of the run, and how to repeat it. */
 export class Footer implements View {
   readonly element: HTMLElement;
   private readonly details = html("div", { class: "origin-details" });
@@ -74,12 +74,12 @@ export class Footer implements View {
     this.element = html(
       "footer",
       {},
-      html("h2", {}, "How this came about"),
+      html("h2", {}, "About this run"),
       this.details,
       html(
         "p",
         { class: "small" },
-        `Written by loopbit ${this.version}. This page is complete in itself: it loads nothing and sends nothing.`,
+        `Written by loopbit ${this.version}. This page is self-contained: it loads nothing and sends nothing.`,
       ),
     );
   }
@@ -88,17 +88,13 @@ export class Footer implements View {
     const { record } = model.run;
     if (!record) {
       this.details.replaceChildren(
-        html(
-          "p",
-          {},
-          "There is no record of this run: neither its options nor its machine is known.",
-        ),
+        html("p", {}, "There is no record of this run. Its options and machine are unknown."),
       );
       return;
     }
     const given = record.arguments ?? [];
     this.details.replaceChildren(
-      html("h3", {}, given.length > 0 ? "To run it again" : "Input and settings"),
+      html("h3", {}, given.length > 0 ? "Run it again" : "Input and settings"),
       given.length > 0 ? command(commandOf(given)) : html("p", {}, inputOf(record)),
       ...(this.defaults
         ? [html("p", { class: "small" }, differing(record.options, this.defaults))]
@@ -115,8 +111,8 @@ export class Footer implements View {
 function differing(options: Options, defaults: Options): string {
   const list = changed(options, defaults).map(([name, value]) => `${name} = ${value}`);
   return list.length === 0
-    ? "All settings are the defaults."
-    : `Settings that are not the defaults: ${list.join(", ")}.`;
+    ? "All settings have their default values."
+    : `Changed settings: ${list.join(", ")}.`;
 }
 
 function command(text: string): HTMLElement {
@@ -132,8 +128,8 @@ function machine({ machine, threads, wall_s, peak_memory_mib }: RunRecord): HTML
     machine.system,
     format.counted(threads, "thread"),
   ];
-  if (wall_s !== undefined) facts.push(`${wall_s.toFixed(1)} s in all`);
-  if (peak_memory_mib !== undefined) facts.push(`${peak_memory_mib.toFixed(0)} MiB at most`);
+  if (wall_s !== undefined) facts.push(`${wall_s.toFixed(1)} s in total`);
+  if (peak_memory_mib !== undefined) facts.push(`${peak_memory_mib.toFixed(0)} MiB peak memory`);
   return html("p", {}, facts.join(", "));
 }
 
@@ -150,7 +146,7 @@ function settings(options: Options, defaults: Options | undefined): HTMLElement 
   const table = html(
     "table",
     { class: "numbers settings" },
-    html("caption", {}, "All settings in force; 'loopbit options' explains each"),
+    html("caption", {}, "All settings of the run; 'loopbit options' describes them"),
     html("tbody", {}, ...rows),
   );
   return html("details", {}, html("summary", {}, `All ${rows.length} settings`), table);

@@ -40,7 +40,7 @@ function rounded(value: number): string {
   return String(Number.isInteger(shown) ? value : shown);
 }
 
-/** Three significant digits or so; steps take from microseconds to seconds. */
+/** About three significant digits, because steps take microseconds to seconds. */
 export function milliseconds(value: number): string {
   if (value >= 100) return count(Math.round(value));
   if (value >= 10) return value.toFixed(1);

@@ -7,7 +7,7 @@ import type { RunModel } from "./run_model.ts";
 import { nameOfStatus } from "./status_text.ts";
 import { nameOf } from "./verdicts.ts";
 
-/** What the pointer is told about a frame. */
+/** The tooltip of a frame. */
 export function frameText(model: RunModel, frame: number): string[] {
   const mark = model.mark(frame);
   const lines = [`frame ${frame}`];

@@ -9,7 +9,7 @@ import type { RunModel } from "./run_model.ts";
 
 const kNoRevisits = "no revisits scored";
 
-/** Its frames are drawn, not decoded. */
+/** Frames of the built-in world are rendered, not decoded. */
 const isBuiltInWorld = ({ input }: RunRecord) => input.description.startsWith("built-in world");
 
 function number(name: string, key: string, value: string, ...note: Child[]): HTMLElement {
@@ -65,13 +65,13 @@ function judged(e: Evaluation): HTMLElement[] {
   ];
 }
 
-/** From where on every loop would be right. */
+/** The score from which every loop would be right. */
 function limitOf({ score_at_full_precision: score, curve }: Evaluation): string {
   if (score !== null) return `from score ${format.score(score)}`;
-  return curve.length === 0 ? "no candidates" : "the best score is wrong";
+  return curve.length === 0 ? "no candidates" : "the highest score is wrong";
 }
 
-/** How many frames there are, and how far they are known. */
+/** The number of frames, if it is known. */
 function framesOf(model: RunModel): HTMLElement {
   const { frames } = model;
   if (!model.run.frames_known) {
@@ -85,7 +85,7 @@ function framesOf(model: RunModel): HTMLElement {
   return number("frames", "frames", format.count(frames), note);
 }
 
-/** The numbers one looks for first. What a table above already says of several runs is left out. */
+/** The most important numbers. Those that the comparison already shows are left out. */
 export function keyNumbers(model: RunModel, isCompared: boolean): HTMLElement[] {
   const { evaluation, record, frames_known } = model.run;
   const time = model.totalTime();
@@ -99,7 +99,7 @@ export function keyNumbers(model: RunModel, isCompared: boolean): HTMLElement[] 
   if (time) {
     spent.push(
       number(
-        "ms a frame",
+        "ms per frame",
         "time.mean",
         format.milliseconds(time.mean),
         `p99 ${format.milliseconds(time.p99)}`,
@@ -107,11 +107,11 @@ export function keyNumbers(model: RunModel, isCompared: boolean): HTMLElement[] 
     );
   }
   if (record?.frames_per_s !== undefined) {
-    const source = isBuiltInWorld(record) ? "with drawing the world" : "with decoding";
+    const source = isBuiltInWorld(record) ? "including rendering" : "including decoding";
     const memory = `${format.count(Math.round(record.peak_memory_mib ?? 0))} MiB`;
     spent.push(
       number(
-        "frames a second",
+        "frames per second",
         "frames_per_s",
         format.rate(record.frames_per_s),
         `${source}, ${memory}`,

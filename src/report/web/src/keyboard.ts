@@ -5,16 +5,16 @@ import { button, html } from "./dom.ts";
 import type { Store } from "./store.ts";
 
 const kKeys: readonly (readonly [string, string])[] = [
-  ["← →", "the frame before, the frame after, among those that the filter lets through"],
-  ["Home End", "the first, the last of them"],
-  ["Tab", "to the next control or plot"],
+  ["← →", "previous and next frame that the filter shows"],
+  ["Home End", "first and last of these frames"],
+  ["Tab", "next control or plot"],
   [
     "+ − 0",
-    "zoom in on the selected frame, zoom out, show all, in the plot that has the focus; it follows the frame",
+    "zoom in on the selected frame, zoom out, show all, in the focused plot, which follows the frame",
   ],
-  ["wheel, drag", "zoom and move a plot that was clicked; Ctrl + wheel zooms any"],
-  ["?", "this list"],
-  ["Esc", "close it"],
+  ["wheel, drag", "zoom and move a plot after clicking it; Ctrl + wheel zooms any plot"],
+  ["?", "show this list"],
+  ["Esc", "close this list"],
 ];
 
 /** The list of keys, and the button that opens it. */

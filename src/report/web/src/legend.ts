@@ -11,7 +11,7 @@ export interface Legend {
   show(model: RunModel): void;
 }
 
-/** Revisits with a wrong loop are missed, too, though another mark is drawn. */
+/** Revisits with a wrong loop also count as missed, but have the mark of the wrong loop. */
 function numberOf(model: RunModel, verdict: Marked): string {
   const marked = model.framesMarked(verdict).length;
   const all = verdict === "missed" ? model.framesIn(verdict).length : marked;
@@ -19,7 +19,7 @@ function numberOf(model: RunModel, verdict: Marked): string {
   return format.count(all) + (others > 0 ? ` (${format.count(others)} marked as wrong)` : "");
 }
 
-/** The marks that occur, with their names and numbers. */
+/** The marks that occur, with their names and counts. */
 export function legend(): Legend {
   const element = html("ul", { class: "legend" });
   return {

@@ -19,7 +19,7 @@ import { caption, section, type View } from "./view.ts";
 
 const kMaxSide = 640;
 
-/** xi of every frame with every earlier one, with truth and loops over it. */
+/** xi of every frame with every earlier frame, with truth and loops drawn on top. */
 export class Matrix implements View {
   readonly element: HTMLElement;
   private readonly caption = caption();
@@ -92,14 +92,14 @@ export class Matrix implements View {
 
   private describe(model: RunModel): void {
     const hasPairs = (model.run.truth?.same_place.length ?? 0) > 0;
-    const outlined = hasPairs ? "Outlined: true pairs." : "There is no true pair to outline.";
+    const outlined = hasPairs ? "True pairs are outlined." : "There are no true pairs.";
     const truth = this.truth
       ? outlined
-      : "No truth is known; --truth FILE outlines the true pairs.";
+      : "There is no ground truth. --truth FILE outlines the true pairs.";
     const matrix = model.run.similarity_matrix;
     this.caption.textContent = matrix
       ? `${meaningOfCells(matrix)} ${truth} Click a cell to see its two frames.`
-      : `Loops by query and match; the run kept no contents to compare. ${truth}`;
+      : `Loops by query and match. The run stored no binary contents to compare. ${truth}`;
     this.key.replaceChildren();
   }
 
@@ -154,7 +154,7 @@ export class Matrix implements View {
     ctx.stroke();
   }
 
-  /** A loop's mark where one is near, else the pair under the pointer. */
+  /** The nearest loop mark, otherwise the pair under the pointer. */
   private hitAt(pixel: Point, to: Projection): Hit | null {
     const model = this.store.model;
     const loops = model.framesIn("loops").filter((frame) => model.isLoopHere(frame));
@@ -180,7 +180,7 @@ export class Matrix implements View {
     return { frame, against: earlier, at: { x: earlier + 0.5, y: frame + 0.5 }, cross: true, text };
   }
 
-  /** What the cell of two frames says, and of which frames it says so. */
+  /** The text of a cell, and the frames that it covers. */
   private cellText(frame: number, earlier: number): string[] {
     if (!this.image) return [];
     const { side, framesPerCell, levels } = this.image;
@@ -212,13 +212,13 @@ export class Matrix implements View {
   }
 }
 
-/** What was compared, and what became of it where a cell stands for several frames. */
+/** What a cell shows, and how it is computed if it covers several frames. */
 function meaningOfCells(matrix: SimilarityMatrix): string {
   const { frames_per_cell: wide, compared_every: step } = matrix;
   if (wide === 1) return "The similarity ξ of each query with every earlier frame.";
-  const cell = `A cell is the largest ξ of ${wide} × ${wide} frames`;
+  const cell = `A cell shows the largest ξ of ${wide} × ${wide} frames`;
   if (step === 1) {
     return `The similarity ξ of each query with every earlier frame. ${cell}.`;
   }
-  return `The similarity ξ of one frame in ${step} with one in ${step} before it, and of every frame with its own match. ${cell}, as far as they were compared.`;
+  return `The similarity ξ of one frame in ${step} with one earlier frame in ${step}, and of every frame with its own match. ${cell}, among those that were compared.`;
 }

@@ -12,7 +12,7 @@ import type { RunModel } from "./run_model.ts";
 import type { Selection, Store } from "./store.ts";
 import type { View } from "./view.ts";
 
-/** The selected frame beside its partner, and all that the answer rests on. */
+/** The selected frame beside its partner, with the evidence of the decision. */
 export class PairBrowser implements View {
   readonly element: HTMLElement;
   private readonly filters: Filters;
@@ -86,7 +86,7 @@ export class PairBrowser implements View {
     this.position.textContent = at < 0 ? `${all} ${filter}` : `${format.count(at + 1)} of ${all}`;
   }
 
-  /** The choice of the frame beside the query, where there is one. */
+  /** The buttons that choose the frame beside the query, if there is a choice. */
   private showPartners(model: RunModel, { frame, against }: Selection): void {
     const choices: HTMLButtonElement[] = [];
     const add = (name: string, to: Selection["against"]) => {

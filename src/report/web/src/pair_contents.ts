@@ -12,7 +12,7 @@ import { onThemeChange, type Theme, theme } from "./theme.ts";
 
 type Paint = (pixel: number, theme: Theme) => string | null;
 
-/** Saliency and binary content of both, their AND at the best shift, and xi. */
+/** Saliency and binary content of both frames, their AND at the best shift, and xi. */
 export class PairContents {
   readonly element = html("div", { class: "contents" });
   private repaint: (() => void)[] = [];
@@ -66,7 +66,7 @@ export class PairContents {
   private and(a: Content, b: Content, tolerance: number): HTMLElement {
     const overlap = overlapOf(a, b, tolerance);
     const { moved, shift } = overlap;
-    const picture = this.map("both contents, laid over each other", (i, colours) => {
+    const picture = this.map("both contents, overlaid", (i, colours) => {
       if (moved[i] && b[i]) return colours.ink;
       if (moved[i]) return colours["step-content"];
       return b[i] ? colours.missed : null;
@@ -89,7 +89,7 @@ export class PairContents {
         html(
           "p",
           { class: "small" },
-          `A moved by ${columns} ${Math.abs(shift) === 1 ? "column" : "columns"}, the best of up to ±${tolerance}. `,
+          `A shifted by ${columns} ${Math.abs(shift) === 1 ? "column" : "columns"}, the best of up to ±${tolerance}. `,
           html("span", { class: "dot both" }),
           "both ",
           html("span", { class: "dot only-a" }),

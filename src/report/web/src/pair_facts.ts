@@ -13,7 +13,7 @@ function fact(name: string, key: string, ...value: Child[]): HTMLElement {
   return html("div", {}, html("dt", {}, name), html("dd", { "data-key": `pair.${key}` }, ...value));
 }
 
-/** What was decided about the frame, and on what numbers: those with its best candidate. */
+/** The decision for the frame, and the numbers of its best candidate. */
 export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] {
   const { run } = model;
   const { frame } = selection;
@@ -70,6 +70,6 @@ export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] 
     facts.append(fact("took", "took", `${format.milliseconds(model.totals_ms[frame] ?? 0)} ms`));
   }
   if (model.isWithCandidate(selection) || !has) return [line, why, facts];
-  const whose = `With its ${candidateName(model, frame)}, which is not shown:`;
+  const whose = `Values of its ${candidateName(model, frame)}, which is not shown:`;
   return [html("p", { class: "whose", "data-key": "pair.whose" }, whose), line, why, facts];
 }

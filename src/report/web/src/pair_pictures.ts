@@ -7,9 +7,9 @@ import { absenceOf, partnerAbsence, partnerName } from "./partner.ts";
 import type { RunModel } from "./run_model.ts";
 import type { Selection } from "./store.ts";
 
-/** Between the two pictures, as a share of the width of one. */
+/** Gap between the two pictures, as a share of the width of one. */
 const kGap = 0.02;
-/** Wider pictures stand one above the other. */
+/** Wider pictures are stacked vertically. */
 const kWide = 1.9;
 const kManyLines = 40;
 const kCrowd = 120;

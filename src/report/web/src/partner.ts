@@ -4,14 +4,14 @@
 import type { RunModel } from "./run_model.ts";
 import type { Selection } from "./store.ts";
 
-/** "match 17", "best candidate 1:17": what the frame's own numbers were taken with. */
+/** The frame's own candidate, such as "match 17" or "best candidate 1:17". */
 export function candidateName(model: RunModel, frame: number): string {
   const name = model.matchName(frame);
   if (name === null) return model.isLoop(frame) ? "match elsewhere" : "no candidate";
   return `${model.isLoop(frame) ? "match" : "best candidate"} ${name}`;
 }
 
-/** What the frame beside the query is. */
+/** The name of the frame beside the query. */
 export function partnerName(model: RunModel, selection: Selection): string {
   if (model.isWithCandidate(selection)) return candidateName(model, selection.frame);
   const partner = model.partner(selection);
@@ -19,29 +19,27 @@ export function partnerName(model: RunModel, selection: Selection): string {
   return partner === null ? "no true place" : `true place ${partner}`;
 }
 
-/** Why there is no picture of a frame of this run, and what brings it. */
+/** Why a frame of this run has no picture, and how to get one. */
 export function absenceOf(model: RunModel, frame: number): string {
   if (!model.isReadable(frame)) return "This image could not be read.";
   if (Object.keys(model.run.pictures).length === 0) {
     return model.run.record
-      ? "No pictures were kept with this run, or --pictures-mb left no room for one."
-      : "There are no pictures: they come with runs of loopbit.";
+      ? "This run has no pictures, or --pictures-mb left no space for them."
+      : "Only runs of loopbit have pictures.";
   }
-  return "Left out to keep the page small; --pictures-mb N makes room for more.";
+  return "Left out to keep the page small. --pictures-mb N allows more.";
 }
 
 function noCandidate(model: RunModel, frame: number): string {
-  if (model.isLoop(frame)) return "A frame of another recording.";
-  return model.tellsUnreadable()
-    ? "No earlier frame came into question."
-    : "The detector names no match.";
+  if (model.isLoop(frame)) return "The match is a frame of another recording.";
+  return model.tellsUnreadable() ? "There is no candidate." : "The detector reports no match.";
 }
 
 /** Why there is no picture beside the query. */
 export function partnerAbsence(model: RunModel, selection: Selection): string {
   const partner = model.partner(selection);
   if (partner !== null) return absenceOf(model, partner);
-  if (selection.against === "truth") return "Truth lists no earlier place of this frame.";
+  if (selection.against === "truth") return "The truth lists no earlier place for this frame.";
   const earlier = model.earlierMatch(selection.frame);
   if (!earlier) return noCandidate(model, selection.frame);
   const map = model.run.record?.map?.path ?? "the map";

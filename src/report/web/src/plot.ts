@@ -13,12 +13,12 @@ import { onThemeChange, theme } from "./theme.ts";
 
 const plots: Plot[] = [];
 
-/** Before and after printing the page has another width, and no observer tells in time. */
+/** Printing changes the width of the page, and observers report that too late. */
 export function resizePlots(): void {
   for (const plot of plots) plot.resize();
 }
 
-/** Draws the plots one by one, each after what was ready before it is on the screen. */
+/** Draws the plots one by one, each after the previous one is on the screen. */
 export async function startPlots(): Promise<void> {
   for (const plot of plots) {
     await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
@@ -26,7 +26,7 @@ export async function startPlots(): Promise<void> {
   }
 }
 
-/** uPlot for axes, scales and canvas; what is on it is drawn by the view. */
+/** uPlot provides axes, scales and canvas; the view draws the content. */
 export class Plot implements PlotInput {
   readonly element: HTMLElement;
   private readonly overlay = svg("svg", { class: "overlay", "aria-hidden": "true" });
@@ -47,13 +47,13 @@ export class Plot implements PlotInput {
     plots.push(this);
   }
 
-  /** From now on it is drawn, as wide as there is room. */
+  /** Draws the plot from now on, at the available width. */
   start(): void {
     this.resize();
     new ResizeObserver(() => this.resize()).observe(this.element);
   }
 
-  /** Buttons for those who neither wheel nor drag. */
+  /** Zoom buttons, for users without wheel or drag. */
   controls(): HTMLElement {
     const name = this.spec.label.split(".")[0] ?? "";
     return html(
@@ -73,7 +73,7 @@ export class Plot implements PlotInput {
     );
   }
 
-  /** Other data: everything is shown again. */
+  /** Shows everything again, after the data changed. */
   reset(): void {
     this.home = this.spec.bounds();
     this.show(this.home);
@@ -106,14 +106,14 @@ export class Plot implements PlotInput {
     this.plot?.redraw(false, false);
   }
 
-  /** Only what marks the selection. */
+  /** Redraws only the selection. */
   mark(): void {
     if (!this.plot) return;
     const to = this.projection(this.plot);
     this.overlay.replaceChildren(...this.spec.selected(to), ...this.hoverMarks(to));
   }
 
-  /** Another frame is selected: it is marked, and the view moved to where it is. */
+  /** Marks a newly selected frame and moves the view to it. */
   follow(): void {
     const place = this.spec.place?.();
     if (!this.plot || !place || shows(this.view, this.spec.zoom, place)) {
@@ -177,7 +177,7 @@ export class Plot implements PlotInput {
     return { x: to.atX(pixel.x), y: to.atY(pixel.y) };
   }
 
-  /** What is selected, if it is in view. */
+  /** The selection, if it is in view. */
   private centre(): { x: number; y: number } {
     const place = this.spec.place?.();
     return place && shows(this.view, this.spec.zoom, place) ? place : middle(this.view);

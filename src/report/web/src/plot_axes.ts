@@ -13,7 +13,7 @@ const kWholeSteps = [1, 10, 100, 1000, 10_000, 100_000].flatMap((unit) => [
 ]);
 
 const kNumber = new Intl.NumberFormat("en-GB", { maximumFractionDigits: 6 });
-/** Room to the right of a plot, CSS pixels; it grows in steps, for labels change with the view. */
+/** Margin to the right of a plot, CSS pixels; grows in steps, because labels change with the view. */
 const kLeastRoom_px = 14;
 const kRoomStep_px = 4;
 const ruler = document.createElement("canvas").getContext("2d");
@@ -52,7 +52,7 @@ export function axesOf(spec: PlotSpec): { axes: uPlot.Axis[]; overhang: () => nu
   };
 }
 
-/** Half the widest label: one stands in the middle under its tick, which may be the last pixel. */
+/** Half the width of the widest label, because labels are centred under their ticks. */
 function roomFor(labels: readonly string[]): number {
   if (!ruler) return kLeastRoom_px;
   ruler.font = `${kFont_px}px ${theme().font}`;

@@ -9,7 +9,7 @@ const kDragBegins_px = 4;
 const kWheelSpeed = 1 / 400;
 export const kZoomStep = 1.6;
 
-/** What pointer, wheel and keys may do with a plot. */
+/** The operations of pointer, wheel and keys on a plot. */
 export interface PlotInput {
   readonly element: HTMLElement;
   readonly isZoomable: boolean;
@@ -18,12 +18,12 @@ export interface PlotInput {
   hover(hit: Hit | null): void;
   select(hit: Hit): void;
   zoom(factor: number, event?: MouseEvent): void;
-  /** Shows `from` moved by so many CSS pixels. */
+  /** Shows `from`, moved by this many CSS pixels. */
   pan(from: Bounds, dx: number, dy: number): void;
   reset(): void;
 }
 
-/** `over` is what lies over the plotting area. */
+/** `over` is the element over the plotting area. */
 export function listenToPlot(plot: PlotInput, over: HTMLElement): void {
   over.addEventListener("pointermove", (event) => {
     const hit = event.buttons === 0 ? plot.hitAt(event) : null;
@@ -53,7 +53,7 @@ export function listenToPlot(plot: PlotInput, over: HTMLElement): void {
   });
 }
 
-/** From press to release: a drag moves the plot, a click selects. */
+/** Handles press to release: a drag moves the plot, a click selects. */
 function followPointer(plot: PlotInput, over: HTMLElement, down: PointerEvent): void {
   const from = plot.bounds;
   let isDrag = false;

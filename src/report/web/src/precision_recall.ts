@@ -16,7 +16,7 @@ import type { Point } from "./verdicts.ts";
 import { caption, section, type View } from "./view.ts";
 
 const kCaption =
-  "Each point is what would be found, and how much of it true, if every frame with at least that score were a loop; the large dot is the detector as shipped, the bar the most it finds without a wrong loop.";
+  "Each point shows recall and precision if every frame with at least that score were a loop. The large dot is the detector's own decision. The bar is the highest recall without a wrong loop.";
 
 const at = ({ recall, precision }: { recall: number; precision: number }): Point => ({
   x: recall,
@@ -36,7 +36,7 @@ export class PrecisionRecall implements View {
     private readonly models: readonly RunModel[],
   ) {
     this.plot = new Plot({
-      label: "Precision and recall. One curve a run.",
+      label: "Precision and recall. One curve per run.",
       xLabel: "recall",
       yLabel: "precision",
       height: (width) => Math.max(260, Math.min(width * 0.66, 420)),
@@ -73,7 +73,7 @@ export class PrecisionRecall implements View {
         html(
           "li",
           {},
-          `as shipped: recall ${format.share(recall)}, precision ${format.share(precision)}`,
+          `as decided: recall ${format.share(recall)}, precision ${format.share(precision)}`,
         ),
         html("li", {}, `recall at 100 % precision: ${format.share(full)}`),
       );
@@ -157,7 +157,7 @@ export class PrecisionRecall implements View {
     return { frame, at: at(point), text };
   }
 
-  /** The point of the curve that the selected frame's score makes. */
+  /** The point of the curve at the score of the selected frame. */
   private place(): Point | null {
     const { store } = this;
     const score = store.model.score(store.now.frame);
@@ -175,13 +175,13 @@ export class PrecisionRecall implements View {
 }
 
 function captionOf({ run }: RunModel): string {
-  if (!run.evaluation) return "There is no truth to judge this run by.";
+  if (!run.evaluation) return "There is no ground truth for this run.";
   if (run.evaluation.positives === 0) {
-    return "No revisit is scored: there is nothing to recall, and no curve.";
+    return "There is no curve because no revisit is scored.";
   }
   return curveOf(run.evaluation).length > 0
     ? kCaption
-    : "No frame has a candidate that is right or wrong: there is no precision, and no curve.";
+    : "There is no curve because no candidate is right or wrong.";
 }
 
 function atIndex(curve: readonly CurvePoint[], i: number): Point | null {

@@ -4,7 +4,7 @@
 import { resizePlots } from "./plot.ts";
 import { refreshTheme } from "./theme.ts";
 
-/** Canvases do not follow the style of paper by themselves: they are drawn again for it. */
+/** Redraws the canvases for printing, because they do not follow print styles. */
 export function followPrinting(): void {
   const root = document.documentElement;
   const set = (isPaper: boolean) => {

@@ -3,7 +3,7 @@
 
 import type { Bounds } from "./bounds.ts";
 
-/** From data to pixels and back, for a rectangle of pixels that shows some bounds. */
+/** Converts between data and pixels, for a rectangle of pixels that shows some bounds. */
 export class Projection {
   private readonly scaleX: number;
   private readonly scaleY: number;
@@ -15,7 +15,7 @@ export class Projection {
     readonly width: number,
     readonly height: number,
     private readonly yDown: boolean,
-    /** Canvas pixels a CSS pixel: sizes are multiplied by it. */
+    /** Canvas pixels per CSS pixel; multiply sizes by it. */
     readonly ratio: number,
   ) {
     this.scaleX = width / (bounds.x[1] - bounds.x[0]);

@@ -1,28 +1,28 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
-/** What the page shows: the JSON that src/report/report.cpp puts into the page. */
+/** The data of the page: the JSON that src/report/report.cpp writes into it. */
 export interface ReportData {
   /** Version of loopbit that wrote the report. */
   loopbit: string;
   /** One run, or several on the same input. */
   runs: Run[];
-  /** All settings as they are if none is given: `loopbit options --json`. */
+  /** The default settings, as in `loopbit options --json`. */
   default_options?: RunRecord["options"];
 }
 
-/** How truth judges a frame. `found`, `missed`: revisits; the rest of the frames have no true earlier place. */
+/** The verdict on a frame. Only revisits can be `missed`. */
 export type Verdict =
-  | "none" // no loop, and none was to be found (or no truth)
-  | "right" // a loop, and true
+  | "none" // no loop, and no revisit (or no truth)
+  | "right" // a right loop
   | "tolerated" // a loop that is neither right nor wrong
-  | "wrong" // a loop, and false
-  | "missed" // a revisit without a right loop: status tells why
-  | "loop" // a loop, and no truth to judge it by
-  | "elsewhere" // a loop into an earlier session of the map, which truth does not speak of
-  | "ignored"; // left out of the score
+  | "wrong" // a wrong loop
+  | "missed" // a revisit without a right loop; the status says why
+  | "loop" // a loop without truth
+  | "elsewhere" // a loop into an earlier session of the map, which truth does not cover
+  | "ignored"; // not scored
 
-/** Columns have one entry a frame. */
+/** Columns have one entry per frame. */
 export interface Run {
   name: string;
   /** run.json as it stands in the folder; null for another detector's matches. */
@@ -30,7 +30,7 @@ export interface Run {
   /** The score from which the detector accepts (decision.min_score). */
   threshold: number | null;
   frames: number;
-  /** Else there are at least so many: a detector lists no frames that it has nothing to say of. */
+  /** False if `frames` is a lower bound: other detectors may list only frames with a match. */
   frames_known: boolean;
   timestamp_s: (number | null)[] | null;
   /** Names of statuses ("loop", "no_earlier_place", ...), and an index into them for each frame. */
@@ -40,18 +40,18 @@ export interface Run {
   match: number[];
   /** The best candidates that are frames of earlier sessions of the map; null if none is. */
   earlier_match: ([session: number, frame: number] | null)[] | null;
-  /** Null where the detector says nothing of a frame. */
+  /** Null if the detector reports nothing for a frame. */
   score: (number | null)[];
-  /** These are null where the detector does not report them. */
+  /** Null if the detector does not report them. */
   similarity: number[] | null;
   matches: number[] | null;
   inliers: number[] | null;
   times_ms: StepTimes | null;
   verdict: Verdict[];
-  /** Flat triples query, first, last; and where that is from, in words, if it is known. */
+  /** Flat triples query, first, last; and a description of the source, if known. */
   truth: { same_place: number[]; near_place: number[]; source: string | null } | null;
   evaluation: Evaluation | null;
-  /** Camera centres in the plane of the world in which they reach furthest, m; null where not known. */
+  /** Camera centres in the plane of their largest extent, m; null if unknown. */
   positions: {
     x_m: (number | null)[];
     y_m: (number | null)[];
@@ -79,10 +79,10 @@ export interface TimeSummary {
 /** See docs/run_folder.md. A run that did not end has no results. */
 export interface RunRecord {
   loopbit: string;
-  /** What followed the name of the command; none if a library made the run. */
+  /** Arguments of the command; none if the library made the run. */
   arguments?: string[];
   input: { path: string; description: string; every: number; limit: number };
-  /** Where what was seen is kept, and which of its sessions this run is. */
+  /** The map, and the session of this run in it. */
   map?: { path: string; session: number };
   stopped_by: string;
   options: Record<string, Record<string, number | boolean>>;
@@ -117,18 +117,18 @@ export interface Evaluation {
   /** 95 %, Wilson. */
   precision_interval: [number, number];
   recall_at_full_precision: number;
-  /** The lowest score without a wrong loop at or above it; null if even the best is wrong. */
+  /** The lowest score without a wrong loop at or above it; null if the highest is wrong. */
   score_at_full_precision: number | null;
   average_precision: number;
   pairs: { positives: number; right: number; recall: number };
   curve: CurvePoint[];
 }
 
-/** xi of two frames each, at most `side` cells a side: the largest of those compared in a cell. */
+/** xi of pairs of frames in `side` x `side` cells; a cell has the largest xi compared in it. */
 export interface SimilarityMatrix {
   side: number;
   frames_per_cell: number;
-  /** Every so-many-th frame was compared with every so-many-th, and each frame with its match. */
+  /** Only every N-th frame was compared with every N-th, and each frame with its match. */
   compared_every: number;
   /** base64 PNG, 8-bit grey, side x side, row = later frame, column = earlier; 255 = xi of 1. */
   png: string;

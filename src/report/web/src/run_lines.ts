@@ -3,7 +3,7 @@
 
 import { svg } from "./dom.ts";
 
-/** Runs are told apart by dashes: the colours are for verdicts. */
+/** Runs differ by dashes, because colours show verdicts. */
 const kDashes: readonly (readonly number[])[] = [
   [],
   [7, 4],
@@ -17,7 +17,7 @@ const kDashes: readonly (readonly number[])[] = [
 
 export const dashOf = (run: number): readonly number[] => kDashes[run % kDashes.length] ?? [];
 
-/** A piece of the run's line, for legends. */
+/** A sample of the run's line, for legends. */
 export function lineOf(run: number, isSelected: boolean): SVGSVGElement {
   const line = svg("line", {
     x1: 0,

@@ -19,7 +19,7 @@ export type Filter = (typeof kFilters)[number];
 export type Step = "content" | "retrieval" | "features" | "verification";
 export const kSteps: readonly Step[] = ["content", "retrieval", "features", "verification"];
 
-/** The detector's default, for runs that left no record of theirs. */
+/** The detector's default, for runs without a record. */
 const kDefaultShiftTolerance = 4;
 
 type Span = readonly [first: number, last: number];
@@ -30,9 +30,9 @@ export interface EarlierFrame {
   frame: number;
 }
 
-/** A run, and what follows from its columns. */
+/** A run, and values derived from its columns. */
 export class RunModel {
-  /** Milliseconds of all steps, one a frame; null where the detector does not report them. */
+  /** Total milliseconds per frame; null if the detector does not report them. */
   readonly totals_ms: readonly number[] | null;
   private readonly truth = new Map<number, Span[]>();
   private readonly members = new Map<Filter, readonly number[]>();
@@ -74,12 +74,12 @@ export class RunModel {
     return this.status(frame) !== "unreadable";
   }
 
-  /** Null where the detector says nothing of the frame. */
+  /** Null if the detector reports nothing for the frame. */
   score(frame: number): number | null {
     return this.run.score[frame] ?? null;
   }
 
-  /** Whether the detector says which frames it could not read. */
+  /** Whether the detector reports unreadable frames. */
   tellsUnreadable(): boolean {
     return this.run.status_names.includes("unreadable");
   }
@@ -98,7 +98,7 @@ export class RunModel {
     return match < 0 ? null : match;
   }
 
-  /** The same, if it is a frame of an earlier session of the map. */
+  /** The best candidate, if it is a frame of an earlier session of the map. */
   earlierMatch(frame: number): EarlierFrame | null {
     const match = this.run.earlier_match?.[frame];
     return match ? { session: match[0], frame: match[1] } : null;
@@ -116,7 +116,7 @@ export class RunModel {
     return this.truth.get(frame) ?? [];
   }
 
-  /** The true place that stands for all of a frame's: the middle of its first span. */
+  /** The true place that represents all of a frame's: the middle of its first span. */
   truePlace(frame: number): number | null {
     const span = this.trueSpans(frame)[0];
     return span ? span[0] + Math.floor((span[1] - span[0]) / 2) : null;
@@ -128,7 +128,7 @@ export class RunModel {
     return against === "truth" ? this.truePlace(frame) : against;
   }
 
-  /** Whether what is shown beside the selected frame is its best candidate, or would be. */
+  /** Whether the frame beside the selected one is its best candidate, or would be. */
   isWithCandidate(selection: { frame: number; against: Against }): boolean {
     const { frame, against } = selection;
     if (against === "match") return true;
@@ -172,7 +172,7 @@ export class RunModel {
     return this.framesIn("loops").filter((frame) => !this.isLoopHere(frame));
   }
 
-  /** Seconds; of the first frame that has a time. */
+  /** Time of the first frame that has one, in seconds. */
   firstTime(): number {
     return this.run.timestamp_s?.find((time) => time !== null) ?? 0;
   }
@@ -182,7 +182,7 @@ export class RunModel {
     return typeof columns === "number" ? columns : kDefaultShiftTolerance;
   }
 
-  /** As run.json has it, else from the columns; null where there are none. */
+  /** As in run.json, otherwise from the columns; null if there are none. */
   totalTime(): TimeSummary | null {
     return this.run.record?.times_ms?.total ?? (this.totals_ms && this.summary(this.totals_ms));
   }
@@ -192,7 +192,7 @@ export class RunModel {
     return this.run.record?.times_ms?.[step] ?? (times ? this.summary(times) : null);
   }
 
-  /** The frame to begin with: what went wrong, else the clearest loop. */
+  /** The frame shown first: a failure, otherwise the loop with the highest score. */
   firstFrame(): number {
     const wrong = this.framesIn("wrong")[0];
     if (wrong !== undefined) return wrong;
@@ -202,13 +202,13 @@ export class RunModel {
     return loops.reduce((best, frame) => (score(frame) > score(best) ? frame : best), first);
   }
 
-  /** What the frame is marked as; an ignored frame only if it is a loop. */
+  /** The mark of a frame. An ignored frame has one only if it is a loop. */
   mark(frame: number): Marked | null {
     const verdict = this.verdict(frame);
     return isMarked(verdict) && (verdict !== "ignored" || this.isLoop(frame)) ? verdict : null;
   }
 
-  /** A revisit without a right loop; one with a wrong loop is marked as that. */
+  /** A revisit without a right loop. One with a wrong loop is marked as wrong. */
   private isMissed(frame: number): boolean {
     const mark = this.mark(frame);
     return mark === "missed" || (mark === "wrong" && this.truePlace(frame) !== null);

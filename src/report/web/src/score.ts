@@ -13,7 +13,7 @@ import type { Theme } from "./theme.ts";
 import { drawMarks, kMarked, markRadius, type Point } from "./verdicts.ts";
 import { caption, section, type View } from "./view.ts";
 
-/** The score of every frame, in order, with the threshold that makes a loop of it. */
+/** The score of every frame, in order, with the threshold. */
 export class Score implements View {
   readonly element: HTMLElement;
   private readonly caption = caption();
@@ -21,7 +21,7 @@ export class Score implements View {
 
   constructor(private readonly store: Store) {
     this.plot = new Plot({
-      label: "Score along the run. The score of each frame.",
+      label: "Score over time. The score of each frame.",
       xLabel: "frame",
       yLabel: "score",
       height: (width) => Math.max(220, Math.min(width * 0.34, 300)),
@@ -42,7 +42,7 @@ export class Score implements View {
     });
     this.element = section(
       "score",
-      "Score along the run",
+      "Score over time",
       this.caption,
       this.plot.controls(),
       this.plot.element,
@@ -53,8 +53,8 @@ export class Score implements View {
     const { threshold } = model.run;
     this.caption.textContent =
       threshold === null
-        ? "The score of each frame's best candidate, as the detector gave it, where it gave one; its threshold is not known."
-        : `The score of each frame's best candidate. From ${format.score(threshold)}, the dashed line, it is accepted.`;
+        ? "The score of each frame's best candidate, as reported by the detector. Its threshold is unknown."
+        : `The score of each frame's best candidate. It is accepted from ${format.score(threshold)} (dashed line).`;
     this.plot.reset();
   }
 
@@ -132,7 +132,7 @@ export class Score implements View {
     ctx.fillText(text, ...at);
   }
 
-  /** The nearest mark, else the frame in the column under the pointer. */
+  /** The nearest mark, otherwise the frame in the column under the pointer. */
   private frameAt(pixel: Point, to: Projection): number | null {
     const model = this.store.model;
     const near = nearest(

@@ -12,7 +12,7 @@ export interface SimilarityImage {
   /** 0 to 255, row by row. */
   levels: Uint8Array;
   picture: HTMLCanvasElement;
-  /** xi at either end of the colours. */
+  /** xi at both ends of the colour scale. */
   range: readonly [low: number, high: number];
 }
 
@@ -44,7 +44,7 @@ export async function decodeMatrix(matrix: SimilarityMatrix): Promise<Similarity
   return { side, framesPerCell: matrix.frames_per_cell, levels, picture, range };
 }
 
-/** The levels between which most cells are: one or two odd cells may not take all the colours. */
+/** The range of most cells, so that a few outliers do not use up the colour scale. */
 function span(levels: Uint8Array, side: number): [number, number] {
   const histogram = new Uint32Array(256);
   let cells = 0;

@@ -5,7 +5,7 @@ import { html } from "./dom.ts";
 import * as format from "./format.ts";
 import { kSteps, type RunModel } from "./run_model.ts";
 
-/** The mean of each step, a bar a run, with a tick at p99 of the total. */
+/** The mean of each step, one bar per run, with a tick at p99 of the total. */
 export function stepBars(models: readonly RunModel[]): HTMLElement[] {
   const longest = models.reduce((most, model) => Math.max(most, model.totalTime()?.p99 ?? 0), 0);
   const rows = models.flatMap((model) => {
@@ -31,5 +31,5 @@ export function stepBars(models: readonly RunModel[]): HTMLElement[] {
       ),
     ];
   });
-  return [html("h3", {}, "Mean of each step, run by run; the tick is p99"), ...rows];
+  return [html("h3", {}, "Mean of each step per run; the tick marks p99 of the total"), ...rows];
 }

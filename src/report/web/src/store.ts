@@ -3,7 +3,7 @@
 
 import { type Filter, kFilters, type RunModel } from "./run_model.ts";
 
-/** With what the frame is shown: its best candidate, its true place, or a frame by number. */
+/** The frame beside the selected one: its best candidate, its true place, or any frame. */
 export type Against = "match" | "truth" | number;
 
 export interface Selection {
@@ -15,7 +15,7 @@ export interface Selection {
 
 type Listener = (now: Selection, before: Selection) => void;
 
-/** What is selected: the one place that all views read and change. The address keeps it. */
+/** The selection, which all views read and change. It is stored in the address. */
 export class Store {
   private selection: Selection;
   private readonly listeners: Listener[] = [];
@@ -45,7 +45,7 @@ export class Store {
     this.change({ frame, against });
   }
 
-  /** Where the filter leaves the selected frame out, the next that it lets through is selected. */
+  /** If the filter hides the selected frame, the next visible frame is selected. */
   filter(filter: Filter): void {
     const frames = this.model.framesIn(filter);
     const { frame, against } = this.selection;
@@ -71,7 +71,7 @@ export class Store {
     for (const listener of this.listeners) listener(this.selection, before);
   }
 
-  /** By `step` frames along those that the filter lets through. */
+  /** Moves by `step` frames among those that the filter shows. */
   walk(step: number): void {
     const frames = this.model.framesIn(this.selection.filter);
     const { frame } = this.selection;

@@ -10,14 +10,14 @@ import type { RunModel } from "./run_model.ts";
 import type { Selection, Store } from "./store.ts";
 import type { View } from "./view.ts";
 
-/** What was found, in one sentence. */
+/** The result in one sentence. */
 export function sentenceOf(model: RunModel): string {
   const { evaluation } = model.run;
   const loops = model.framesIn("loops").length;
   const elsewhere = model.loopsElsewhere().length;
   const frames = model.run.frames_known ? ` in ${format.counted(model.frames, "frame")}` : "";
   if (!evaluation) {
-    const unknown = loops > 0 ? "judge them by" : "say whether one was missed";
+    const unknown = loops > 0 ? "judge them" : "tell whether one was missed";
     const where =
       elsewhere > 0
         ? `, ${elsewhere === loops ? "all" : `${format.count(elsewhere)} of them`} into earlier sessions of the map`
@@ -37,11 +37,11 @@ export function sentenceOf(model: RunModel): string {
   return `${found}, ${format.counted(wrong, "wrong loop")}${also}${apart}.`;
 }
 
-/** Those that truth lists may all be left out of the score. */
+/** The truth may list revisits of which none is scored. */
 const noRevisits = ({ run }: RunModel) =>
   (run.truth?.same_place.length ?? 0) > 0 ? "No revisit is scored" : "No place was visited twice";
 
-/** A tolerated loop does not find a revisit, which is marked as missed. */
+/** A revisit with a tolerated loop counts as missed. */
 function toleratedOf(model: RunModel, tolerated: number): string {
   const missed = model.loopsMarked("missed").length;
   const where = missed === 1 ? "a missed revisit" : "missed revisits";
@@ -51,7 +51,7 @@ function toleratedOf(model: RunModel, tolerated: number): string {
 
 const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
-/** Name, sentence, numbers; a table where there are several runs. */
+/** Name, sentence and numbers; with several runs also a table. */
 export class Summary implements View {
   readonly element: HTMLElement;
   private readonly title = html("h1");
@@ -101,15 +101,15 @@ export class Summary implements View {
 function noticeOf({ record, times_ms: times }: Run): string {
   if (record) {
     if (record.stopped_by === "running") {
-      return "The run has not ended, or was killed; this is what it had found when the page was written.";
+      return "The run has not ended, or was killed. The page shows its state when the page was written.";
     }
     if (record.stopped_by === "end") return "";
     return record.stopped_by === "interrupt"
-      ? "The run was interrupted; this is what it found until then."
+      ? "The run was interrupted. The page shows the results so far."
       : `The run stopped early: ${record.stopped_by}`;
   }
   return times
-    ? "There is no run.json: the run was cut off, and its options and machine are not known."
+    ? "There is no run.json. The run was cut off; its options and machine are unknown."
     : "";
 }
 
@@ -125,6 +125,6 @@ function originOf({ record, evaluation, truth }: Run): HTMLElement[] {
     );
   }
   if (evaluation?.protocol) parts.push(`protocol: ${evaluation.protocol}`);
-  if (truth) parts.push(`truth: ${truth.source || "as it was given"}`);
+  if (truth) parts.push(`truth: ${truth.source || "given as values"}`);
   return parts.map((part) => html("span", {}, part));
 }

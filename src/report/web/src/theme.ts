@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
-/** The colours that canvases need; they are named and set in base.css. */
+/** The colours of the canvases; base.css defines them. */
 const kNames = [
   "paper",
   "ink",
@@ -45,7 +45,7 @@ function apply(): void {
   for (const listener of listeners) listener();
 }
 
-/** Paper is white, whatever the screen was. */
+/** Printed pages are always light. */
 export function scheme(): Scheme {
   if (printing.matches || document.documentElement.classList.contains("printing")) return "light";
   return chosen ?? (preferred.matches ? "dark" : "light");
@@ -68,7 +68,7 @@ export function startTheme(): void {
   apply();
 }
 
-/** Called when the page becomes paper, and when it is a screen again. */
+/** Called before and after printing. */
 export function refreshTheme(): void {
   apply();
 }

@@ -3,7 +3,7 @@
 
 import { kSteps, type RunModel, type Step } from "./run_model.ts";
 
-/** Some frames, and what their steps took on average. */
+/** Some frames, and the mean times of their steps. */
 export interface TimeBin {
   from: number;
   to: number;
@@ -12,7 +12,7 @@ export interface TimeBin {
   total_ms: number;
 }
 
-/** The slowest frames would squeeze all others: what is beyond is counted in the last bin. */
+/** Limits the axis, so that the slowest frames do not squeeze the others; they are in the last bin. */
 const kBeyond = 1.3;
 
 function finished(model: RunModel, bin: { from: number; to: number; frames: number[] }): TimeBin {

@@ -32,8 +32,8 @@ export class TimePlot {
     const isDistribution = kind === "distribution";
     this.plot = new Plot({
       label: `Times, ${kind}. Stacked bars of the steps.`,
-      xLabel: isDistribution ? "ms a frame" : "frame",
-      yLabel: isDistribution ? "frames" : "ms a frame",
+      xLabel: isDistribution ? "ms per frame" : "frame",
+      yLabel: isDistribution ? "frames" : "ms per frame",
       height: () => 230,
       zoom: "none",
       whole: isDistribution ? "y" : "x",
@@ -135,7 +135,7 @@ export class TimePlot {
     const frame = bin.frames.reduce((a, b) => ((totals[b] ?? 0) > (totals[a] ?? 0) ? b : a));
     const steps = kSteps.map((step) => `${step} ${format.milliseconds(bin.mean_ms[step])}`);
     const head = this.isDistribution
-      ? `${format.counted(bin.frames.length, "frame")} of about ${format.milliseconds(bin.total_ms)} ms`
+      ? `${format.counted(bin.frames.length, "frame")} with about ${format.milliseconds(bin.total_ms)} ms`
       : `frames ${bin.from} to ${bin.to - 1}: ${format.milliseconds(bin.total_ms)} ms`;
     const text = [head, ...steps, `slowest: frame ${frame}`];
     return { frame, at: { x: (bin.from + bin.to) / 2, y: this.heightOf(bin) }, text };

@@ -12,7 +12,7 @@ import { caption, section, type View } from "./view.ts";
 
 const kFigures = ["mean", "p50", "p99", "max"] as const;
 
-/** What each step takes: by how long, along the run, and in numbers. */
+/** The time of each step: distribution, over time, and as a table. */
 export class Times implements View {
   readonly element: HTMLElement;
   private readonly caption = caption();
@@ -42,7 +42,7 @@ export class Times implements View {
     const hasTimes = model.run.times_ms !== null;
     this.content.hidden = !hasTimes;
     this.caption.textContent = hasTimes
-      ? "Left, how many frames take how long; the colours show which steps take the time. Right, the mean along the run: it rises where the number of places costs time."
+      ? "Left: distribution of the time per frame, coloured by step. Right: mean time over the run; it rises if the number of places costs time."
       : "This detector reports no times.";
     if (!hasTimes) return;
     this.showTable(model);
@@ -71,7 +71,7 @@ export class Times implements View {
         ),
       );
     this.table.replaceChildren(
-      html("caption", {}, "Milliseconds a frame, over the readable frames"),
+      html("caption", {}, "Milliseconds per frame, over the readable frames"),
       html(
         "thead",
         {},

@@ -6,7 +6,7 @@ import { html } from "./dom.ts";
 const kGap_px = 14;
 const tip = html("div", { class: "tip", "aria-hidden": "true", hidden: true });
 
-/** The one note that follows the pointer. `x`, `y` in the window. */
+/** The tooltip at the pointer. `x`, `y` in the window. */
 export function showTip(lines: readonly string[], x: number, y: number): void {
   if (!tip.isConnected) document.body.append(tip);
   tip.replaceChildren(...lines.map((line) => html("div", {}, line)));

@@ -14,12 +14,12 @@ import type { Theme } from "./theme.ts";
 import { drawMarks, kMarked, markRadius, type Point } from "./verdicts.ts";
 import { caption, section, type View } from "./view.ts";
 
-/** A marked frame is meant even where the path comes a little nearer. */
+/** A marked frame wins over a slightly nearer point of the path. */
 const kMarkedFirst_px = -6;
 const kCurveSteps = 10;
 const kManyLoops = 1500;
 
-/** The drive with its loops; without positions the frames on a ring. */
+/** The trajectory with its loops; without positions the frames on a ring. */
 export class Trajectory implements View {
   readonly element: HTMLElement;
   private readonly caption = caption();
@@ -70,11 +70,11 @@ export class Trajectory implements View {
         })
       : ringOf(frames);
     this.caption.textContent = positions
-      ? `The drive in metres, in the plane in which it reaches furthest (${positions.axes.join(" and ")} of its positions), with a line from each query to its match. Click a frame to see its pair.`
-      : "The frames in order around a ring, clockwise from the top, with a line from each query to its match. --poses FILE shows the drive as it was.";
+      ? `The trajectory in metres, in the plane of its largest extent (${positions.axes.join(" and ")}). A line connects each query with its match. Click a frame to see its pair.`
+      : "The frames on a ring, clockwise from the top. A line connects each query with its match. --poses FILE shows the real trajectory.";
     if (model.loopsElsewhere().length > 0) {
       this.caption.append(
-        " A loop into another session has no line: its match is none of these frames.",
+        " A loop into another session has no line, because its match is not one of these frames.",
       );
     }
     this.element.classList.toggle("ring", this.isRing);
@@ -157,7 +157,7 @@ export class Trajectory implements View {
     ctx.globalAlpha = 1;
   }
 
-  /** Straight in the plane; towards the middle on the ring, so that chords come apart. */
+  /** Straight in the plane; curved towards the centre on the ring, so that chords separate. */
   private addLink(path: Path2D, to: Projection, from: Point, match: Point, count: number): void {
     path.moveTo(to.x(from.x), to.y(from.y));
     const steps = this.isRing && count < kManyLoops ? kCurveSteps : 1;

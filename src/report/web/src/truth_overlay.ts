@@ -4,7 +4,7 @@
 import { html } from "./dom.ts";
 import type { Projection } from "./projection.ts";
 
-/** Which cells of the matrix hold a true pair, and where that area ends. */
+/** The cells of the matrix with a true pair, and their outline. */
 export interface TruthOverlay {
   fill: HTMLCanvasElement;
   /** x1, y1, x2, y2 in cells. */

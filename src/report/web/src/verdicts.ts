@@ -5,7 +5,7 @@ import { svg } from "./dom.ts";
 import type { Verdict } from "./report_data.ts";
 import type { Theme } from "./theme.ts";
 
-/** What a verdict is called, and its mark: told apart by shape as well as by colour. */
+/** The name and the mark of a verdict. Marks differ in shape and colour. */
 interface Mark {
   name: string;
   meaning: string;
@@ -21,11 +21,11 @@ const kCircle = "M0.8,0A0.8,0.8 0 1 1 -0.8,0A0.8,0.8 0 1 1 0.8,0Z";
 const kMarks: Record<Marked, Mark> = {
   ignored: {
     name: "not scored",
-    meaning: "a loop that truth says to leave out of the score",
+    meaning: "a loop that the ground truth excludes from the score",
     path: kCircle,
     style: "hollow",
   },
-  right: { name: "right", meaning: "a loop, and true", path: kCircle, style: "filled" },
+  right: { name: "right", meaning: "a right loop", path: kCircle, style: "filled" },
   tolerated: {
     name: "tolerated",
     meaning: "a loop that counts neither as right nor as wrong",
@@ -34,13 +34,13 @@ const kMarks: Record<Marked, Mark> = {
   },
   loop: {
     name: "loop",
-    meaning: "a loop; there is no truth to judge it by",
+    meaning: "a loop without ground truth",
     path: "M-0.75,-0.75H0.75V0.75H-0.75Z",
     style: "filled",
   },
   elsewhere: {
     name: "elsewhere",
-    meaning: "a loop into an earlier session of the map, which truth does not judge",
+    meaning: "a loop into an earlier session of the map, which the ground truth does not cover",
     path: "M-0.75,-0.75H0.75V0.75H-0.75Z",
     style: "hollow",
   },
@@ -52,13 +52,13 @@ const kMarks: Record<Marked, Mark> = {
   },
   wrong: {
     name: "wrong",
-    meaning: "a loop, and false",
+    meaning: "a wrong loop",
     path: "M-0.8,-0.8L0.8,0.8M0.8,-0.8L-0.8,0.8",
     style: "stroked",
   },
 };
 
-/** In the order of drawing: what matters most comes last, on top. */
+/** In drawing order: the most important marks come last, on top. */
 export const kMarked: readonly Marked[] = [
   "ignored",
   "tolerated",
@@ -73,7 +73,7 @@ export const isMarked = (verdict: Verdict): verdict is Marked => verdict in kMar
 export const nameOf = (verdict: Marked): string => kMarks[verdict].name;
 export const meaningOf = (verdict: Marked): string => kMarks[verdict].meaning;
 
-/** The mark as a picture in the text; decoration, as its name stands beside it. */
+/** The mark as an icon in text. Decorative, because its name is beside it. */
 export function markIcon(verdict: Marked): SVGSVGElement {
   const path = svg("path", {
     d: kMarks[verdict].path,
@@ -123,7 +123,7 @@ export function drawMarks(
   ctx.stroke(all);
 }
 
-/** Smaller where there are many; CSS pixels. */
+/** Marks are smaller if there are many; CSS pixels. */
 export function markRadius(count: number): number {
   if (count <= 60) return 5;
   if (count <= 400) return 4;

@@ -14,20 +14,20 @@
 
 namespace loopbit {
 
-/// What a frame looked like and what its answer rests on, as kept for people.
+/// The picture of a frame and the evidence of its decision, stored for people.
 struct StoredEvidence {
-  std::vector<unsigned char> picture_jpeg;  ///< as picture_jpeg() makes it
+  std::vector<unsigned char> picture_jpeg;  ///< see picture_jpeg()
   std::vector<unsigned char> saliency_png;  ///< 64 x 64, 8 bits; 255 = the map's largest value
   BinaryContent content;
   std::vector<PointPair> inliers;
 };
 
-/// Writes evidence.db, a SQLite file with a row a frame; see docs/run_folder.md. After a crash it
-/// opens with all but the last 32 frames. Throws Error (kind output). About 10 KB and 1 ms a frame.
+/// Writes evidence.db, a SQLite file with one row per frame; see docs/run_folder.md. After a crash
+/// it has all but the last 32 frames. Throws Error (kind output). About 10 KB and 1 ms per frame.
 class EvidenceWriter {
  public:
   explicit EvidenceWriter(const std::string& path);
-  /// Saves as finish() does and swallows its error: a run that ends by an error is looked at, too.
+  /// Saves like finish(), but ignores its error, so that a run that failed can be viewed.
   ~EvidenceWriter();
   EvidenceWriter(const EvidenceWriter&) = delete;
   EvidenceWriter& operator=(const EvidenceWriter&) = delete;
@@ -36,7 +36,7 @@ class EvidenceWriter {
 
   void add(PlaceId frame, const cv::Mat& image, const Evidence& evidence);
 
-  /// Saves what is not yet saved.
+  /// Saves the remaining frames.
   void finish();
 
  private:
@@ -54,7 +54,7 @@ class EvidenceReader {
   EvidenceReader(EvidenceReader&&) noexcept;
   EvidenceReader& operator=(EvidenceReader&&) noexcept;
 
-  /// False if there is nothing about `frame`.
+  /// False if there is no evidence for `frame`.
   bool read(PlaceId frame, StoredEvidence& evidence) const;
 
   /// Calls back with each frame's content, in order.

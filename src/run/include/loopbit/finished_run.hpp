@@ -14,26 +14,26 @@
 
 namespace loopbit {
 
-/// What a run left in its folder; see docs/run_folder.md.
+/// The folder of a run; see docs/run_folder.md.
 struct FinishedRun {
   std::string path;
   std::vector<Detection> detections;
-  std::string record_json;           ///< run.json; empty where there is none
-  std::optional<GroundTruth> truth;  ///< as it was given to the run
-  /// Camera centres, one a frame; empty where the run had no poses.
+  std::string record_json;           ///< run.json; empty if there is none
+  std::optional<GroundTruth> truth;  ///< the truth that the run was given
+  /// Camera centres, one per frame; empty if the run had no poses.
   std::vector<std::optional<cv::Vec3d>> positions_m;
-  std::string evidence_path;  ///< empty where there is none
+  std::string evidence_path;  ///< empty if there is none
 };
 
-/// Reads a run folder, also one whose run was cut off. Throws Error (kind input) if `path` holds no
-/// run or a file of it is malformed.
+/// Reads a run folder, also of an interrupted run. Throws Error (kind input) if `path` has no run
+/// or one of its files is malformed.
 FinishedRun read_run(const std::string& path);
 
-/// The rows of a loops.csv. A last row without a line end was cut off and is left out. Throws Error
-/// (kind input) that names file and line.
+/// Reads the rows of a loops.csv. A last row without a line end was cut off and is dropped. Throws
+/// Error (kind input) with file and line.
 std::vector<Detection> read_detections(const std::string& path);
 
-/// What `detections` say, as any detector's list would.
+/// Converts detections to a MatchList.
 MatchList match_list(const std::vector<Detection>& detections);
 
 }  // namespace loopbit

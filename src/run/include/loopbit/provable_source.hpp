@@ -12,25 +12,27 @@
 
 namespace loopbit {
 
-/// A source that can be asked for a frame that a detector can use before a run of it replaces
-/// another.
+/// A source that can check that it has a usable frame, before a run of it replaces another run.
 class ProvableSource final : public ImageSource {
  public:
   explicit ProvableSource(std::unique_ptr<ImageSource> source);
 
-  /// Reads ahead, so that next() gives all the same, to the first frame that can be used, which it
-  /// returns; valid until the next call of any function. Throws Error (kind input) that names
-  /// `input` if none is left.
+  /// Reads ahead to the first usable frame and returns it. next() still returns all frames. The
+  /// reference is valid until the next call of any function. Throws Error (kind input) with `input`
+  /// if there is none.
   const Frame& prove(const std::string& input);
 
   bool next(Frame& frame) override;
   bool skip() override;
   [[nodiscard]] std::optional<std::size_t> size() const override { return source_->size(); }
   [[nodiscard]] std::string description() const override { return source_->description(); }
+  [[nodiscard]] std::string early_end() const override {
+    return ahead_.empty() ? source_->early_end() : "";
+  }
 
  private:
   std::unique_ptr<ImageSource> source_;
-  std::deque<Frame> ahead_;  ///< read, and not given yet
+  std::deque<Frame> ahead_;  ///< read, but not yet returned
 };
 
 }  // namespace loopbit

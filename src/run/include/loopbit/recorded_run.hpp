@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,40 +21,41 @@
 
 namespace loopbit {
 
-/// Where a run is kept, and what of it.
+/// The output of a run.
 struct RunOutput {
   std::string folder;      ///< empty = beside the map, "town_session_2" for session 2 of "town.db"
   bool overwrite = false;  ///< an earlier run in the folder
-  bool keep_images = false;              ///< a small picture of each place in the map
-  std::vector<std::string> inputs = {};  ///< files that are read, and never replaced
+  bool keep_images = false;  ///< a small picture of each place in the map
+  std::size_t map_cache_mb = kMapCache_mb;
+  std::vector<std::string> inputs = {};  ///< input files, which are never replaced
 };
 
-/// A run of a new detector that leaves its evidence in a folder and, where one is named, its places
-/// in a map. Call detect(), what is to be kept with it, and finish(), whatever happened before.
+/// A run of a new detector that writes a run folder and, if a map is given, its places to the map.
+/// Call detect(), then the functions for further data, and always finish().
 class RecordedRun {
  public:
-  /// `record`: what is read, and with which settings; record.map_path names the map to continue.
-  /// Throws Error as validate(), MapWriter and RunFolder do; the map is opened first, so that what
-  /// refuses the run costs no earlier one. Kind option if neither folder nor map is named.
+  /// `record` has the input and the settings; record.map_path is the map to continue. Throws Error
+  /// as validate(), MapWriter and RunFolder do. The map is opened first, so that a refused run does
+  /// not replace an earlier one. Kind option if neither folder nor map is given.
   RecordedRun(RunRecord record, const RunOutput& out);
 
-  /// Runs over `source`, once, as run() does, with `listener` told of each frame after it is kept.
-  /// The map is saved and closed, also where the run fails. `keep_evidence`: for write_report().
-  /// Throws what run() throws, Error (kind output) where something cannot be kept, and Error (kind
-  /// input) where the source has ended and no frame was readable.
+  /// Runs once over `source`, like run(), and calls `listener` for each frame after it is saved.
+  /// The map is saved and closed, even if the run fails. `keep_evidence` stores data for
+  /// write_report(). Throws what run() throws, Error (kind output) if something cannot be saved,
+  /// and Error (kind input) if the source has ended without a readable frame.
   void detect(ImageSource& source, const RunListener& listener, bool keep_evidence,
               const std::atomic<bool>& stop);
 
   /// See RunFolder::write_positions.
   void keep_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m);
 
-  /// Scores what was detected, and keeps what it was scored by.
+  /// Scores the detections, and stores the truth.
   void score(const GroundTruth& truth, const EvaluationOptions& options);
 
-  /// Writes run.json with how it went. `stopped_by`: see RunRecord. Throws Error (kind output).
+  /// Writes the final run.json. `stopped_by`: see RunRecord. Throws Error (kind output).
   void finish(const std::string& stopped_by);
 
-  /// What detect() found damaged in the map and left out, a clause a thing.
+  /// The damage that detect() found in the map, one clause each. Damaged rows were left out.
   [[nodiscard]] const std::vector<std::string>& map_damage() const { return map_damage_; }
 
   [[nodiscard]] const RunRecord& record() const { return record_; }

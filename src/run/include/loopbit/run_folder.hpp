@@ -22,49 +22,60 @@ namespace loopbit {
 /// RunRecord::stopped_by of a run that has not ended.
 inline constexpr const char* kRunning = "running";
 
-/// What a run has to say beside its detections; see docs/run_folder.md.
+/// The data of a run besides its detections; see docs/run_folder.md.
 struct RunRecord {
   std::string input;        ///< as given by the user
-  std::string description;  ///< of the input, see ImageSource
+  std::string description;  ///< description of the input, see ImageSource
   LoopDetectorOptions options;
-  int every = 1;  ///< of the input's frames, every so-many-th was read
-  int views = 1;  ///< so many of them in turn are one frame for files of truth (2: left, right)
-  int limit = 0;  ///< at most so many were read; 0 = all
+  int every = 1;  ///< only every N-th frame of the input was read
+  int views = 1;  ///< images per frame of the truth (2: left, right)
+  int limit = 0;  ///< at most this many frames were read; 0 = all
   int threads = 1;
-  int map_session = 0;        ///< of this run, where there is a map
+  int map_session = 0;        ///< session of this run, if there is a map
   std::string map_path = {};  ///< empty = none
-  /// "running", "end", "interrupt", or the sentence of an error. A run that was killed is running
-  /// for ever.
+  /// "running", "end", "interrupt", or an error message. A killed run keeps "running".
   std::string stopped_by = "end";
-  double wall_s = 0;                        ///< reading and detecting
-  std::vector<std::string> arguments = {};  ///< of the command, after its name; empty = a library's
-  std::string truth = {};                   ///< what says what is true, for people
-  int truth_every = 1;                      ///< see GroundTruth::every
+  double wall_s = 0;  ///< reading and detecting
+  std::vector<std::string> arguments =
+      {};                      ///< of the command, without its name; empty for a library
+  std::string early_end = {};  ///< of the input, see ImageSource
+  std::string truth = {};      ///< description of the truth, for people
+  int truth_every = 1;         ///< see GroundTruth::every
   std::optional<Evaluation> score = std::nullopt;
 };
 
-/// A folder that a run leaves its evidence in: loops.csv, a row a frame, complete at any moment;
-/// and run.json, which tells of the run from its beginning, and how it went when it has ended.
+class EarlierRun;
+
+/// The folder of a run. loops.csv has one row per frame and is complete at any time. run.json is
+/// written when the run begins, and again when it ends.
 class RunFolder {
  public:
   /// Makes the folder and begins loops.csv. Throws Error (kind output) if the folder holds an
   /// earlier run and `overwrite` is not set, if one of its files is among `inputs` or of no run (a
-  /// data set has a truth.csv, too), or if it cannot be written.
+  /// data set has a truth.csv, too), or if it cannot be written. An earlier run is set aside in a
+  /// folder `earlier_run` inside, removed when this one has ended, and put back if this one leaves
+  /// no row.
   RunFolder(const std::string& path, bool overwrite, const std::vector<std::string>& inputs = {});
+  ~RunFolder();
+  RunFolder(const RunFolder&) = delete;
+  RunFolder& operator=(const RunFolder&) = delete;
+  RunFolder(RunFolder&&) = delete;
+  RunFolder& operator=(RunFolder&&) = delete;
 
   /// Appends a row and hands it to the system, so that it survives this process. Throws Error (kind
   /// output) if the disk is full; rows written before are kept.
   void add(const Detection& detection);
 
-  /// Writes what is true about the run, so that it can be scored and shown again without the
-  /// files it came from: truth.csv, not_false.csv, ignore.csv, unknown.csv, in the numbers of the
-  /// whole sequence; RunRecord::truth_every belongs to them. Throws Error (kind output).
+  /// Writes the ground truth, so that the run can be scored and shown again without the original
+  /// files: truth.csv, not_false.csv, ignore.csv, unknown.csv, counted in frames of the whole
+  /// sequence; see RunRecord::truth_every. Throws Error (kind output).
   void write_truth(const GroundTruth& truth);
 
-  /// Writes positions.csv: camera centres, one a frame. Throws Error (kind output).
+  /// Writes positions.csv: camera centres, one per frame. Throws Error (kind output).
   void write_positions(const std::vector<std::optional<cv::Vec3d>>& positions_m);
 
-  /// Writes run.json anew, all of it or nothing. Throws Error (kind output).
+  /// Writes run.json anew, all of it or nothing. Once it is there, a full disk has room for how the
+  /// run ends, unless its file system writes what is changed elsewhere. Throws Error (kind output).
   void write_record(const RunRecord& record);
 
   [[nodiscard]] const std::vector<Detection>& detections() const { return detections_; }
@@ -80,15 +91,16 @@ class RunFolder {
   };
 
   std::string path_;
+  std::unique_ptr<EarlierRun> earlier_;
   std::unique_ptr<std::FILE, CloseFile> loops_;  ///< unbuffered
   std::int64_t loops_bytes_ = 0;                 ///< of whole rows
   std::vector<Detection> detections_;
 };
 
-/// Time of all steps together.
+/// Total time of all steps.
 double total_ms(const StepTimes& times);
 
-/// Mean and spread of a time over a run, in milliseconds.
+/// Statistics of a time over a run, in milliseconds.
 struct TimeSummary {
   double mean = 0;
   double p50 = 0;
@@ -96,8 +108,8 @@ struct TimeSummary {
   double max = 0;
 };
 
-/// The summary of a time, such as &StepTimes::content_ms or total_ms, over the frames that were
-/// readable; zeros if there are none.
+/// The statistics of a time, such as &StepTimes::content_ms or total_ms, over the readable frames;
+/// zeros if there are none.
 TimeSummary summarize(const std::vector<Detection>& detections,
                       const std::function<double(const StepTimes&)>& time_ms);
 

@@ -19,15 +19,15 @@ namespace loopbit {
 struct Keypoint {
   float x_px = 0;
   float y_px = 0;
-  float scale = 0;      ///< sigma in px: a 9 x 9 box filter has 1.2
-  float angle_rad = 0;  ///< 0 where features are upright
+  float scale = 0;      ///< sigma in px; a 9 x 9 box filter has 1.2
+  float angle_rad = 0;  ///< 0 for upright features
 };
 
-/// However narrow an image is, its longer side is scaled to no more than this.
+/// Upper limit for the longer side of a working image, which matters for very narrow images.
 inline constexpr int kMaxWorkingSide_px = 16384;
 
 /// The features of one image; keypoints[i] belongs to descriptors[i]. Dark blobs come first, then
-/// bright ones, each strongest first.
+/// bright ones, each sorted by strength.
 struct Features {
   cv::Size working_size_px;
   std::size_t num_dark = 0;
@@ -44,17 +44,17 @@ struct SurfOptions {
     using S = SurfOptions;
     return std::tuple{
         Field{"working_area_px", &S::working_area_px, 64 * 64, 4096 * 4096,
-              "images are scaled up or down to about so many pixels before features are sought"},
+              "images are scaled to about this many pixels before features are extracted"},
         Field{"max_keypoints", &S::max_keypoints, 50, 10000,
-              "strongest keypoints kept of an image"},
+              "number of strongest keypoints kept per image"},
         switch_field("upright", &S::upright,
-                     "features do not turn with the image: for cameras that stay level")};
+                     "features do not rotate with the image; for cameras that stay level")};
   }
 };
 
-/// Extracts features from image after image of any size. It owns its working memory, about 12 bytes
-/// a working pixel, and keeps it: for images of a size it has seen, nothing is allocated but what
-/// `features` lacks and what OpenCV needs to resize. Not thread-safe; use one a thread.
+/// Extracts features from images of any size. It keeps its working memory, about 12 bytes per
+/// working pixel. For images of a known size it allocates only what `features` needs and what
+/// OpenCV needs to resize. Not thread-safe; use one per thread.
 class SurfExtractor {
  public:
   /// Throws Error (kind option) if `options` are not valid.
@@ -74,13 +74,13 @@ class SurfExtractor {
   std::unique_ptr<Impl> impl_;
 };
 
-/// SURF features of `gray`, 8 bits, at least 32 x 32 pixels; throws Error (kind input) if it is
+/// SURF features of `gray`, 8 bits, at least 32 x 32 pixels. Throws Error (kind input) if it is
 /// smaller.
 ///
-/// Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 2008. The budget of keypoints
-/// decides: the strongest are kept, of which a cell of a grid may hold three times its share. What
-/// 8 bits cannot tell from noise is left out, so dim images have fewer. The same image gives the
-/// same bits with every instruction set. Cost: see scripts/bench_surf.
+/// Bay, Ess, Tuytelaars, Van Gool, "Speeded-Up Robust Features", CVIU 2008. The strongest
+/// `max_keypoints` are kept; a grid cell may have at most three times its share of them. Responses
+/// within the noise of 8 bits are dropped, so dark images have fewer features. The same image gives
+/// the same bits with every instruction set. Cost: see scripts/bench_surf.
 Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options = {});
 
 }  // namespace loopbit

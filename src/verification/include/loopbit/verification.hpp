@@ -16,7 +16,7 @@
 
 namespace loopbit {
 
-/// Two features taken for the same point of the world.
+/// Two features that may show the same point of the world.
 struct Match {
   int query = 0;  ///< index into the query's features
   int place = 0;  ///< index into the place's features
@@ -36,31 +36,30 @@ struct VerificationOptions {
     using S = VerificationOptions;
     return std::tuple{
         Field{"first_look_keypoints", &S::first_look_keypoints, 16, 10000,
-              "strongest keypoints of either image that tell which candidates to look at closer"},
+              "strongest keypoints per image, matched first to choose candidates for a full match"},
         Field{"max_closer_looks", &S::max_closer_looks, 1, 1'000'000,
-              "candidates whose keypoints are all matched; others only where they seem to share "
-              "what these have"},
+              "candidates matched in full; others only if they seem to share features with these"},
         Field{"max_ratio", &S::max_ratio, 0.1, 1.0,
-              "a match is kept if its distance is less than this part of the second best"},
-        Field{"min_matches", &S::min_matches, 8, 1000, "with fewer matches no geometry is sought"},
+              "a match is kept if its distance is below this share of the second-best distance"},
+        Field{"min_matches", &S::min_matches, 8, 1000,
+              "with fewer matches no geometry is computed"},
         Field{"max_epipolar_error_px", &S::max_epipolar_error_px, 0.1, 50.0,
-              "an inlier lies at most this far (Sampson's distance) from the geometry, working "
-              "pixels"},
+              "largest Sampson distance of an inlier from the geometry, working pixels"},
         Field{"min_spacing_scales", &S::min_spacing_scales, 0.0, 100.0,
-              "inliers closer than this are one piece of evidence; a descriptor spans 20 scales"}};
+              "inliers closer than this many scales count as one; a descriptor spans 20"}};
   }
 };
 
-/// What the geometry of two images says about them showing one place.
+/// The matches and inliers of two images.
 struct Verification {
   std::vector<Match> matches;  ///< one to one
-  std::vector<Match> inliers;  ///< those that one epipolar geometry explains
+  std::vector<Match> inliers;  ///< matches that fit one epipolar geometry
   int distinct_inliers = 0;    ///< see distinct_inliers()
   double explained_share = 0;  ///< see explained_share()
 };
 
-/// What the strongest features of two images have in common, and what a full match of the two need
-/// not find again. Of 600 features each, of which 300 are strongest, 4 KB.
+/// The matches of the strongest features of two images, and intermediate results that a full match
+/// reuses. 4 KB for 300 of 600 features.
 struct FirstLook {
   /// The nearest neighbour of a feature, and the squared distances of it and of the next one.
   struct Neighbours {
@@ -70,9 +69,9 @@ struct FirstLook {
   };
   /// Features with one sign of the Laplacian.
   struct Group {
-    std::size_t num_query = 0;  ///< strongest features of the query ...
-    std::size_t num_place = 0;  ///< ... whose neighbours were sought among so many of the place
-    std::vector<Neighbours> nearest;  ///< of the query's, in order
+    std::size_t num_query = 0;        ///< number of strongest features of the query
+    std::size_t num_place = 0;        ///< number of features of the place they were compared with
+    std::vector<Neighbours> nearest;  ///< of the query's features, in order
   };
 
   std::vector<Match> matches;  ///< one to one
@@ -80,36 +79,36 @@ struct FirstLook {
   Group bright;
 };
 
-/// Mutual best matches by the distance of descriptors that pass the ratio test from either side;
-/// only features with the same sign of the Laplacian are compared. Each feature is in one match at
-/// most: one-way matches gather on few points and fake inliers. Equally near features are ambiguous
-/// and match nothing. A feature that has nothing to be second to is distinct. Cost: half of
-/// query times place features from one side, and the matches found times half the query's back;
-/// no distance is kept.
+/// Mutual best matches by descriptor distance that pass the ratio test from both sides. Only
+/// features with the same sign of the Laplacian are compared. Each feature is in at most one match,
+/// because one-way matches pile up on few points and look like inliers. Equally near features are
+/// ambiguous and do not match. A feature without a second-best neighbour passes the ratio test.
+/// Cost: about half of (query features x place features) in one direction, and half of (matches x
+/// query features) back. No distances are stored.
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio);
 
-/// The largest set of `matches` found that one fundamental matrix explains, by RANSAC with a fixed
-/// seed, or that did not move at all; empty below 8 matches, as 7 always fit. The same input gives
-/// the same inliers.
+/// The largest set of `matches` that fits one fundamental matrix, found by RANSAC with a fixed
+/// seed, or that did not move at all. Empty below 8 matches, because 7 always fit. The same input
+/// gives the same inliers.
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
                                     const std::vector<Match>& matches, double max_error_px);
 
-/// How many of `inliers`, first come first served, lie apart from each other in both images: at
-/// least `min_spacing_scales` times the smaller of two keypoints' scales. Keypoints whose patches
-/// overlap see the same few pixels, and a small thing seen everywhere (a lamp, the end of a zebra
-/// crossing) has many of them, so they are not independent evidence.
+/// Counts the inliers that lie apart in both images, greedily in their order: at least
+/// `min_spacing_scales` times the smaller scale of two keypoints. Keypoints with overlapping
+/// patches see the same few pixels. A small object that exists in many places (a lamp, the end of a
+/// zebra crossing) has many of them, so they are not independent evidence.
 int distinct_inliers(const Features& query, const Features& place,
                      const std::vector<Match>& inliers, double min_spacing_scales);
 
-/// The part of the query's features amid `inliers` that are inliers themselves, 0 to 1; 0 without
-/// any. Amid: within the middle 80 % of the inliers' x and of their y. Of a place seen again, a
-/// tenth or more is found again; where only a door of the same make was found, most of what
-/// surrounds it is left unexplained. Cost: linear in the features.
+/// The share of the query's features among the inliers that are inliers themselves, 0 to 1; 0
+/// without inliers. "Among" means within the middle 80 % of the inliers' x and of their y. At a
+/// true revisit the share is a tenth or more. If only a look-alike door matches, most features
+/// around it do not. Cost: linear in the features.
 double explained_share(const Features& query, const std::vector<Match>& inliers);
 
-/// Step 3 for one pair after another in two halves, so that the second can be left out. Its memory
-/// is kept: once it has seen the largest pair, nothing is allocated but what `result` lacks. Not
-/// thread-safe; use one a thread.
+/// Step 3 for pairs of images, in two halves (matching and geometry), so that callers can skip the
+/// second. It keeps its memory: after the largest pair it allocates only what `result` needs. Not
+/// thread-safe; use one per thread.
 class Verifier {
  public:
   /// Throws Error (kind option) if `options` are not valid.
@@ -124,19 +123,21 @@ class Verifier {
   /// Sets `result.matches` (see match_features) and clears the rest.
   void match(const Features& query, const Features& place, Verification& result);
 
-  /// The same for the strongest `first_look_keypoints` features of each, in a fraction of the time.
+  /// Matches only the strongest `first_look_keypoints` features of each image, in a fraction of the
+  /// time.
   void match_strongest(const Features& query, const Features& place, FirstLook& look);
 
-  /// As match(), after match_strongest() of the same pair, whose neighbours are not sought again.
+  /// As match(), but reuses the result of match_strongest() for the same pair.
   void match(const Features& query, const Features& place, const FirstLook& look,
              Verification& result);
 
-  /// Of what match() finds, the matches of the query's features `asked` (indices, rising), in the
-  /// time of so many features.
+  /// Finds only the matches of the query's features `asked` (increasing indices). The time is
+  /// proportional to their number.
   void match_some(const Features& query, std::span<const int> asked, const Features& place,
                   Verification& result);
 
-  /// Sets the rest from `result.matches`; leaves it empty where they are fewer than min_matches.
+  /// Sets the other fields from `result.matches`. Leaves them empty if there are fewer than
+  /// min_matches.
   void find_geometry(const Features& query, const Features& place, Verification& result);
 
  private:
