@@ -29,8 +29,9 @@ link() {
 }
 
 link loopbit
-link loopbit_data -lloopbit
-link loopbit_report -lloopbit_data -lloopbit
+link loopbit_map -lloopbit
+link loopbit_data -lloopbit_map -lloopbit
+link loopbit_report -lloopbit_data -lloopbit_map -lloopbit
 
 grep -q '^loopbit::LoopDetector::process(' "$scratch/loopbit.symbols"
 # Of the private headers nothing.

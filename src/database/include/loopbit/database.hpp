@@ -26,6 +26,10 @@ void remove_database(const std::string& path);
 /// where something could not be written, else input. What a file says is never trusted: a hostile
 /// one may give wrong rows, but runs no code and takes no more than 256 MiB for a row. For one
 /// thread at a time, with its statements.
+///
+/// SQLiteCpp would not replace it: it closes a file that cannot be opened before the system's
+/// reason can be asked for. The limits, the reading past damage and the remedies, most of this
+/// file, would have to be built around it all the same.
 class Database {
  public:
   enum class Access {
