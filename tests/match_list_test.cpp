@@ -99,7 +99,8 @@ TEST_F(MatchListTest, BadRowsNameFileAndLine) {
 
 TEST_F(MatchListTest, AMissingFrameIsNoticed) {
   const std::string file = write("matches.csv", "frame,match\n0,\n1,\n3,0\n");
-  test::expect_error(ErrorKind::input, {file, "line 4", "frame 2 "}, [&] { read_match_list(file); });
+  test::expect_error(ErrorKind::input, {file, "line 4", "frame 2 "},
+                     [&] { read_match_list(file); });
 }
 
 TEST_F(MatchListTest, BadNamesAreNamed) {

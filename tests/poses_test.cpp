@@ -124,7 +124,7 @@ Poses laps_with_stops(test::Random& random, int frames, double noise_m) {
   for (int i = 0; i < frames; ++i) {
     if (random.between(0, 30) == 0) stands = !stands;
     if (!stands) angle_deg += 10;
-    const double around = angle_deg * kDegree;
+    const double around = angle_deg * kDeg;
     poses.emplace_back(pose_at(8 * std::cos(around), 8 * std::sin(around), angle_deg));
     poses.back()->position_m += noise_m * cv::Vec3d(random.normal(), 0, random.normal());
     if (random.between(0, 40) == 0) poses.back().reset();
