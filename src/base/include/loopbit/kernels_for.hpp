@@ -6,12 +6,9 @@
 
 namespace loopbit {
 
-/// A part's table of inner loops for an instruction set of this processor. `Kernels` declares
-///
-///   template <InstructionSet>
-///   static const Kernels& compiled_for();
-///
-/// which is defined in a source that loopbit_kernels() (cmake/LoopbitKernels.cmake) compiles for
+/// A part's table of inner loops for an instruction set of this processor. `Kernels` declares a
+/// static function template compiled_for() over the instruction set, which returns a const Kernels&
+/// and is defined in a source that loopbit_kernels() (cmake/LoopbitKernels.cmake) compiles for
 /// each set. Such a source, and the headers it includes, use nothing inline that another source
 /// uses, too, such as the standard library's functions: the linker would keep one copy for all, and
 /// that may be one that this processor cannot run.
