@@ -37,6 +37,8 @@ export async function open(
 ) {
   const context = await browser.newContext({ viewport, colorScheme, offline: true });
   const page = await context.newPage();
+  // A busy machine may take longer than the 30 s that are usual.
+  page.setDefaultTimeout(120_000);
   const faults = [];
   const url = pathToFileURL(path.resolve(file)).href;
   page.on("console", (message) => {
