@@ -94,7 +94,10 @@ class Runner:
         if "int main" not in text:
             raise BlockError("not a whole program")
         (self.program / "main.cpp").write_text(text)
-        self.build((CONSUMER / "CMakeLists.txt").read_text())
+        cmake_lists = (CONSUMER / "CMakeLists.txt").read_text()
+        if "loopbit/map_" in text:
+            cmake_lists = cmake_lists.replace("loopbit::loopbit", "loopbit::map")
+        self.build(cmake_lists)
 
     def cmake(self, text):
         if "project(" not in text:

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <iostream>
 #include <mutex>
 
 #include <fcntl.h>
@@ -50,6 +51,7 @@ extern "C" void tell_heard(int signal) {
 }  // namespace
 
 void keep_libraries_quiet() {
+  std::cerr.rdbuf(nullptr);  // where OpenCV prints what its decoders throw
 #ifdef __GLIBC__
   std::FILE* const quiet = fopencookie(
       nullptr, "w", {.read = nullptr, .write = hear, .seek = nullptr, .close = nullptr});

@@ -97,6 +97,15 @@ def answers(case, path):
     return [result.out for result in results]
 
 
+def saved(path):
+    """A map without the counters in its header: a command that meets damage while it writes may
+    have marked its log there."""
+    data = bytearray(path.read_bytes())
+    for begin, end in ((24, 28), (40, 44), (92, 100)):
+        data[begin:end] = bytes(end - begin)
+    return bytes(data)
+
+
 def use_map(case, path, signed=False):
     """Uses a map that may be damaged in every way that there is for it. `signed`: its checksums
     are right, so nobody can know that it was changed."""
@@ -115,9 +124,10 @@ def use_map(case, path, signed=False):
                    "compact": ["map", "compact", path, "--drop", 1],
                    "merge": case.random.choice([["map", "merge", path, case.material.other_map],
                                                 ["map", "merge", new, path]])}[kind]
-        before = contents(path)
+        kept = contents if kind == "run" else saved
+        before = kept(path)
         ran = case.loopbit(*command, codes=(0, 2, 3, 4))
-        case.expect(ran.code == 0 or contents(path) == before,
+        case.expect(ran.code == 0 or kept(path) == before,
                     f"{case.words(ran)}: refused, and yet changed {path.name}: {ran.text}")
     else:
         command = {"query": ["query", path, images / "000002.png"],
@@ -172,10 +182,11 @@ for read in (loopbit.read_match_list, loopbit.read_truth, loopbit.load_options, 
 
 @attack(4)
 def python_reads(case):
-    """Every reader of the Python module gets the file, whatever it is."""
+    """Every reader of the Python module gets the file, whatever it is. The module leaves stderr to
+    its host, so libraries may print there."""
     material = case.material
     sources = [material.map, material.video, *material.formats.iterdir(),
                *(f for files in material.text_files().values() for f in files)]
     file = damaged_copy(case, case.random.choice(sorted(sources)))
     read = case.finish(python(case, PYTHON_READS, file))
-    case.expect(read.code == 0 and not read.err, f"{file.suffix}: {read.code} {read.text[-600:]}")
+    case.expect(read.code == 0, f"{file.suffix}: {read.code} {read.text[-600:]}")
