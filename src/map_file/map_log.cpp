@@ -133,7 +133,7 @@ Origin origin_of(const std::string& log_path) {
 }
 
 std::uint32_t page_bytes_of(const Database::Header& header) {
-  const unsigned value = header[kPageBytesAt] << 8U | header[kPageBytesAt + 1];
+  const unsigned value = unsigned{header[kPageBytesAt]} << 8U | header[kPageBytesAt + 1];
   return value == 1 ? 65536 : value;
 }
 
