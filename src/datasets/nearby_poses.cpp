@@ -51,7 +51,7 @@ NearbyPoses::NearbyPoses(std::vector<CameraPose> poses, PoseLimits largest)
   add_stretches();
 }
 
-std::size_t NearbyPoses::middle(std::size_t begin, std::size_t level) const {
+std::size_t NearbyPoses::middle(std::size_t begin, std::size_t level) {
   return begin + (std::size_t{1} << level) / 2;
 }
 

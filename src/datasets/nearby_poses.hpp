@@ -61,7 +61,7 @@ class NearbyPoses {
   void add_stretches();
   [[nodiscard]] Cell cell(const cv::Vec3d& position_m) const;
   /// Of the block of 2^level poses from `begin`.
-  [[nodiscard]] std::size_t middle(std::size_t begin, std::size_t level) const;
+  [[nodiscard]] static std::size_t middle(std::size_t begin, std::size_t level);
   [[nodiscard]] Verdict judge(const CameraPose& query, const PoseLimits& limits, std::size_t begin,
                               std::size_t level) const;
   void find_in(const CameraPose& query, const PoseLimits& limits, PoseRange range,

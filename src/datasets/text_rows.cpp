@@ -33,7 +33,8 @@ std::string excerpt(std::string_view text) {
 /// Calls visit(part) with what stands before, between and after the separators.
 template <typename Visit>
 void for_each_part(std::string_view text, char separator, const Visit& visit) {
-  for (std::size_t end = text.find(separator); end != text.npos; end = text.find(separator)) {
+  for (std::size_t end = text.find(separator); end != std::string_view::npos;
+       end = text.find(separator)) {
     visit(text.substr(0, end));
     text.remove_prefix(end + 1);
   }

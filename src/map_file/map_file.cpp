@@ -144,9 +144,9 @@ void MapReader::add(const Detection& /*detection*/, const BinaryContent& /*conte
 
 class MapWriter::Impl {
  public:
-  Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
+  Impl(std::string path, const LoopDetectorOptions& options, const std::string& name,
        EncodeImage encode_image, std::size_t cache_mb)
-      : path_(path),
+      : path_(std::move(path)),
         options_(options),
         keeps_images_(encode_image != nullptr),
         writer_(begin_session(name, std::move(encode_image), cache_mb)) {}

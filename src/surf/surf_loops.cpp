@@ -213,7 +213,7 @@ struct Lines {
       // The middle of pixel 0 lies between corners 0 and 1; + 0.5 again rounds.
       const float cells = static_cast<float>(i < kCells ? i : kCells) - 10.5F;
       const float at = center_px + cells * scale + 1.0F;
-      const float end = static_cast<float>(size);
+      const auto end = static_cast<float>(size);
       corners[i] = static_cast<std::int32_t>(at < 0.0F ? 0.0F : (at > end ? end : at));
     }
     for (std::size_t i = 0; i + 1 < kLines; ++i) {

@@ -112,7 +112,9 @@ void solve_samples(const PairSamples& samples, EpipolarPencils& pencils) {
   mixed_determinant(pencils.g, pencils.g, kThird, pencils.determinant[3]);
 }
 
-/// What one block of pairs adds to costs and inliers, where `left` of them count.
+/// What one block of pairs adds to costs and inliers, where `left` of them count. Each array is a
+/// parameter of its own, so that __restrict tells the compiler that none overlaps.
+// NOLINTNEXTLINE(readability-function-size)
 void score_block(const float* __restrict model, const float* __restrict x0,
                  const float* __restrict y0, const float* __restrict x1, const float* __restrict y1,
                  float max_error_sq, std::int32_t left, float* __restrict costs,
