@@ -13,6 +13,7 @@ import concurrent.futures
 import os
 import pathlib
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -67,6 +68,7 @@ def plan(tries, names):
 def main():
     if len(sys.argv) < 4:  # loopbit_command.py has taken the first
         sys.exit(__doc__)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it, and so would what it starts
     map_crash, module, findings = (pathlib.Path(path).resolve() for path in sys.argv[1:4])
     tries = int(sys.argv[4]) if len(sys.argv) > 4 else 3000
     seed = int(sys.argv[5]) if len(sys.argv) > 5 else 2019
