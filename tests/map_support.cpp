@@ -20,7 +20,6 @@ namespace loopbit::test {
 LoopDetectorOptions fast_options() {
   LoopDetectorOptions options;
   options.surf = {.working_area_px = 320 * 240, .max_keypoints = 300};
-  options.decision.full_steps = 1;  // the maps are small
   return options;
 }
 

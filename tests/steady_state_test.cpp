@@ -99,7 +99,6 @@ LoopDetectorOptions small_options() {
   LoopDetectorOptions options;
   options.surf = {.working_area_px = 160 * 120, .max_keypoints = 100};
   options.decision.min_score = 5;
-  options.decision.full_steps = 1;
   return options;
 }
 

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
-#include <tuple>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -18,11 +18,12 @@
 #include "loopbit/gray_image.hpp"
 #include "loopbit/kernels.hpp"
 
-#include "agreement.hpp"
-#include "candidate_verifier.hpp"
+#include "evidence.hpp"
 #include "known_loops.hpp"
+#include "place_filter.hpp"
 #include "place_memory.hpp"
 #include "recent_view.hpp"
+#include "still_features.hpp"
 
 namespace loopbit {
 namespace {
@@ -43,20 +44,27 @@ class Stopwatch {
   Clock::time_point start_ = Clock::now();
 };
 
-Status reason_of_rejection(const VerifiedCandidate& best, const VerificationOptions& options) {
-  if (best.matches < options.min_matches) return Status::few_matches;
-  return best.evidence() == 0 ? Status::no_geometry : Status::low_score;
+/// Places of one path that lie no farther apart are one place.
+constexpr std::ptrdiff_t kSamePlaceSteps = 6;
+/// Of a path that is followed, so many places are looked at, and none that is less likely.
+constexpr std::size_t kMaxExpected = 12;
+constexpr double kMinExpected = 1e-3;
+
+Status reason_of_rejection(const LookedAt& best, const VerificationOptions& options) {
+  const std::size_t matches = best.verification ? best.verification->matches.size() : 0;
+  if (matches < static_cast<std::size_t>(options.min_matches)) return Status::few_matches;
+  return best.excess() == 0 ? Status::no_geometry : Status::low_score;
 }
 
-/// Inliers that moved between two images. Those that did not may be the robot itself, dirt on the
-/// lens or its rim, which are in view for ever.
-int moved_inliers(const Features& query, const Features& place, const std::vector<Match>& inliers) {
+/// Leaves the matches that moved between two images. Those that did not may be the robot itself,
+/// dirt on the lens or its rim, which are in view for ever.
+void keep_moved(const Features& query, const Features& place, std::vector<Match>& matches) {
   constexpr float kMinMotion_px = 2.0F;
-  return static_cast<int>(std::count_if(inliers.begin(), inliers.end(), [&](const Match& match) {
+  std::erase_if(matches, [&](const Match& match) {
     const Keypoint& a = query.keypoints[static_cast<std::size_t>(match.query)];
     const Keypoint& b = place.keypoints[static_cast<std::size_t>(match.place)];
-    return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px) > kMinMotion_px;
-  }));
+    return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px) <= kMinMotion_px;
+  });
 }
 
 /// similarity(a, b) by the kernels: a map may have a million places to compare.
@@ -90,13 +98,8 @@ class LoopDetector::Impl {
   Impl(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
       : options_(options),
         memory_(std::move(map)),
-        agreement_(options.decision),
         surf_(options.surf),
-        verifier_(options.verification),
-        candidates_(options_,
-                    {[this](PlaceId place) -> const Features& { return features(place); },
-                     [this](PlaceId place) { return step_of(place); }},
-                    agreement_, known_loops_) {
+        verifier_(options.verification) {
     validate(options);
     memory_.check_options(options);
     PlaceId latest_step = 0;
@@ -111,6 +114,8 @@ class LoopDetector::Impl {
     memory_.restore_loops([&](std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
       known_loops_.add(step, earlier_step);
     });
+    null_.reserve_next(static_cast<std::size_t>(index_.size()));
+    null_.set_size(static_cast<std::size_t>(index_.size()));
   }
 
   /// One frame as the detector sees it: all that remember() needs.
@@ -119,10 +124,15 @@ class LoopDetector::Impl {
     BinaryContent content;
     Features features;
     RecentView::Look look;
-    FrameContext context;
-    PlaceId compared = -1;  ///< the recent place that verification_ compares it with
-    std::vector<VerifiedCandidate> verified;
-    std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
+    double similarity_to_latest = 0;  ///< xi of it and the latest change of view
+    StillFeatures still;
+    std::vector<LookedAt> places;
+    NullModel::Lesson lesson;
+    std::vector<StepEvidence> evidence;
+    Beliefs prior;                    ///< where the camera is before the frame is looked at
+    Beliefs posterior;                ///< and after
+    std::optional<std::size_t> best;  ///< of `places`
+    double probability = 0;           ///< that the best is right
   };
 
   /// The algorithm of Wang et al. 2019, section III.
@@ -144,17 +154,27 @@ class LoopDetector::Impl {
     detection.times.features_ms = stopwatch.lap_ms();
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, timestamp_s);
-    seen.context = {steps_before(end), view_inliers(seen)};
+    find_still(seen);
+    seen.prior = expected(seen.look.is_step, end);
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
     auto candidates = index_.query(seen.content, end, options_.retrieval);
-    add_expected(seen.content, end, candidates);
+    const std::size_t listed = candidates.size();
+    add_expected(seen, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
-    // Step 3: the one that geometry and the frames before agree on.
-    seen.verified = candidates_.verify(verified_query(seen), candidates);
-    decide(seen, end, detection);
+    // Step 3: what each shows, against what wrong places show, and where the camera is by that.
+    look_at(seen, candidates, listed);
+    if (options_.decision.count_matches) {
+      count_matches(seen, detection);
+    } else {
+      weigh(seen, end);
+      decide(seen, detection);
+    }
+    if (seen.places.empty()) {
+      detection.status = end == 0 ? Status::no_earlier_place : Status::no_similar_place;
+    }
     detection.times.verification_ms += stopwatch.lap_ms();
     return detection;
   }
@@ -162,7 +182,7 @@ class LoopDetector::Impl {
   [[nodiscard]] Evidence evidence(const Observation& seen, const Detection& detection) const {
     Evidence evidence{seen.content, seen.saliency, {}};
     if (detection.inliers == 0) return evidence;
-    const Features& place = features(seen.best->candidate.place);
+    const Features& place = features(seen.places[*seen.best].candidate.place);
     const Verification result = verify(seen.features, place, options_.verification);
     evidence.inliers.reserve(result.inliers.size());
     for (const Match& match : result.inliers) {
@@ -172,48 +192,61 @@ class LoopDetector::Impl {
     return evidence;
   }
 
-  /// How each candidate scored: the answer, and then the others in the order of their rank.
-  [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen) const {
-    candidates_.complete(verified_query(seen), seen.verified);
+  /// How each place that was looked at scored: the answer, and then the others.
+  [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen,
+                                                const Detection& detection) const {
+    std::vector<RankedPlace> ranking;
+    ranking.reserve(seen.places.size());
+    for (std::size_t i = 0; i < seen.places.size(); ++i) {
+      LookedAt& place = seen.places[i];
+      if (!place.verification) look_closer(seen, place);
+      const double score = i == seen.best ? detection.score
+                           : options_.decision.count_matches
+                               ? static_cast<double>(place.verification->matches.size())
+                               : log_odds(seen.posterior.at(place.step));
+      ranking.push_back({.place = origin(place.candidate.place),
+                         .score = score,
+                         .similarity = place.candidate.similarity,
+                         .matches = static_cast<int>(place.verification->matches.size()),
+                         .inliers = static_cast<int>(place.verification->inliers.size())});
+    }
     if (seen.best) {
-      std::erase_if(seen.verified, [&](const VerifiedCandidate& v) {
-        return v.candidate.place == seen.best->candidate.place;
-      });
+      const auto best = ranking.begin() + static_cast<std::ptrdiff_t>(*seen.best);
+      std::rotate(ranking.begin(), best, best + 1);
+      std::stable_sort(ranking.begin() + 1, ranking.end(),
+                       [](const auto& a, const auto& b) { return a.score > b.score; });
     }
-    std::stable_sort(seen.verified.begin(), seen.verified.end(),
-                     [&](const auto& a, const auto& b) { return rank(a, seen) > rank(b, seen); });
-    // First, whatever those that were left out turn out to have.
-    if (seen.best) seen.verified.insert(seen.verified.begin(), *seen.best);
-    std::vector<RankedPlace> places;
-    places.reserve(seen.verified.size());
-    for (const VerifiedCandidate& v : seen.verified) {
-      places.push_back({.place = origin(v.candidate.place),
-                        .score = agreement_.score(v, seen.look.is_step),
-                        .similarity = v.candidate.similarity,
-                        .matches = v.matches,
-                        .inliers = v.inliers});
-    }
-    return places;
+    return ranking;
   }
 
   /// All of it or, where it throws, nothing: what needs memory comes first.
   void remember(Observation seen, const Detection& detection, const cv::Mat& image) {
     recent_view_.reserve_next();
+    null_.reserve_next(static_cast<std::size_t>(index_.size()));
     KnownLoops found;
     if (detection.status == Status::loop) {
       const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
-      found.add(seen.look.is_step ? latest + 1 : latest, known_loops_.first_visit(seen.best->step));
+      found.add(seen.look.is_step ? latest + 1 : latest,
+                known_loops_.first_visit(seen.places[*seen.best].step));
     }
-    Agreement agreement = agreement_;
-    if (seen.look.is_step) {
-      if (seen.best) seen.verified.push_back(*seen.best);
-      agreement.remember(seen.verified);
+    // Correlated as far as it shows what the frame before showed.
+    Beliefs beliefs = updated(seen.prior, seen.evidence, 1 - seen.similarity_to_latest);
+    std::vector<char> with_best(seen.places.size());
+    for (std::size_t i = 0; i < seen.places.size(); ++i) {
+      with_best[i] = seen.best && is_same_place(seen.places[i].step, seen.places[*seen.best].step);
     }
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
-    latest_view_inliers_ = seen.context.view_inliers;
     known_loops_.take(found);
-    agreement_ = std::move(agreement);
+    if (!seen.look.is_step) return;
+    beliefs_ = std::move(beliefs);
+    still_ = std::move(seen.still);
+    if (seen.evidence.empty()) return;
+    null_.learn(seen.lesson, seen.places, [&](const LookedAt& looked_at) {
+      const bool is_best =
+          with_best[static_cast<std::size_t>(&looked_at - seen.places.data())] != 0;
+      return is_best ? 1 - seen.probability : 1.0;
+    });
   }
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
@@ -237,7 +270,7 @@ class LoopDetector::Impl {
     return place < begin ? memory_.origin(place) : SessionFrame{0, place - begin};
   }
 
-  /// See VerifiedCandidate::step.
+  /// See LookedAt::step.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const {
     return place < memory_.session_begin() ? memory_.step_of(place) : recent_view_.step_of(place);
   }
@@ -267,6 +300,7 @@ class LoopDetector::Impl {
   PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection,
                     const cv::Mat& image) {
     index_.reserve_next();
+    null_.reserve_next(static_cast<std::size_t>(index_.size()));
     // The time of a frame that nothing matches may be wrong, and would shut out those after it.
     const double last_s =
         times_s_.empty() ? -std::numeric_limits<double>::infinity() : times_s_.back();
@@ -278,43 +312,54 @@ class LoopDetector::Impl {
       times_s_.pop_back();
       throw;
     }
-    return index_.add(content);
-  }
-
-  static CandidateVerifier::Query verified_query(const Observation& seen) {
-    return {seen.features, seen.look.is_step, seen.context};
+    const PlaceId place = index_.add(content);
+    null_.set_size(static_cast<std::size_t>(index_.size()));
+    return place;
   }
 
   /// How far back the view of a new frame reaches.
   [[nodiscard]] RecentView::Look look(Observation& seen) const {
+    if (!recent_view_.empty()) {
+      seen.similarity_to_latest =
+          similarity(seen.content, index_.content(recent_view_.latest_step()));
+    }
     const bool is_step =
-        recent_view_.empty() ||
-        changes_view(seen.content,
-                     similarity(seen.content, index_.content(recent_view_.latest_step())));
+        recent_view_.empty() || changes_view(seen.content, seen.similarity_to_latest);
     return recent_view_.look(index_.size(), is_step, [&](PlaceId place) {
       if (is_window_fixed()) return true;
-      const Verification& shared = compare(seen, place);
-      return moved_inliers(seen.features, features(place), shared.inliers) >=
-             options_.exclusion.in_view_inliers;
+      const Features& recent = features(place);
+      verifier_.match(seen.features, recent, verification_);
+      keep_moved(seen.features, recent, verification_.matches);
+      verifier_.find_geometry(seen.features, recent, verification_);
+      return static_cast<int>(verification_.inliers.size()) >= options_.exclusion.in_view_inliers;
     });
   }
 
-  /// See FrameContext. A frame that shows the same as the last step can recognise as much.
-  [[nodiscard]] int view_inliers(Observation& seen) const {
-    if (options_.decision.count_matches || recent_view_.empty()) return 0;
-    if (!seen.look.is_step) return latest_view_inliers_;
-    return compare(seen, recent_view_.latest_step()).distinct_inliers;
+  void find_still(Observation& seen) const {
+    verification_.matches.clear();
+    if (!recent_view_.empty()) {
+      verifier_.match(seen.features, features(recent_view_.latest_step()), verification_);
+    }
+    seen.still = StillFeatures(seen.features, still_, verification_.matches, seen.look.is_step);
   }
 
-  /// What a frame shares with a recent place.
-  const Verification& compare(Observation& seen, PlaceId place) const {
-    if (seen.compared != place) {
-      const Features& recent = features(place);
-      verifier_.match(seen.features, recent, verification_);
-      verifier_.find_geometry(seen.features, recent, verification_);
-      seen.compared = place;
-    }
-    return verification_;
+  /// Where the camera is before the frame is looked at. One at rest is where it was.
+  [[nodiscard]] Beliefs expected(bool is_step, PlaceId end) const {
+    const std::ptrdiff_t end_step = end > memory_.session_begin() ? step_of(end - 1) + 1 : 0;
+    const auto exists = [&](std::ptrdiff_t step) {
+      return step >= 0 ? step < end_step : memory_.place_at(step).has_value();
+    };
+    return is_step ? moved(beliefs_, options_.decision.leave_probability, exists)
+                   : only(beliefs_, exists);
+  }
+
+  /// Places that are no rivals: near on the path, in one view, or laps that loops found before
+  /// have shown to be one place.
+  [[nodiscard]] bool is_same_place(std::ptrdiff_t a, std::ptrdiff_t b) const {
+    const auto is_near = [&](std::ptrdiff_t x, std::ptrdiff_t y) {
+      return std::abs(x - y) <= kSamePlaceSteps || recent_view_.in_one_view(x, y);
+    };
+    return is_near(a, b) || is_near(known_loops_.first_visit(a), known_loops_.first_visit(b));
   }
 
   [[nodiscard]] bool is_window_fixed() const {
@@ -335,101 +380,160 @@ class LoopDetector::Impl {
     return std::max(memory_.session_begin(), std::min(first, index_.size() - exclusion.min_frames));
   }
 
-  using Rank = std::tuple<bool, double, int, double>;
-
-  /// Which of several candidates is the place. Agreement over time says that the robot is back; of
-  /// places that are accepted, the one that shows most itself is where.
-  [[nodiscard]] Rank rank(const VerifiedCandidate& v, const Observation& seen) const {
-    const double score = agreement_.score(v, seen.look.is_step);
-    const bool is_accepted = score >= options_.decision.min_score;
-    return {is_accepted, is_accepted ? v.evidence() : score, v.matches, v.candidate.similarity};
-  }
-
-  [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const {
-    return {place,
-            similarity(content, index_.content(place), options_.retrieval.shift_tolerance_columns)};
-  }
-
-  /// The places below `end` that lie at most `radius` from `middle`, in order.
-  static std::vector<PlaceId> around(PlaceId middle, int radius, PlaceId end) {
-    const PlaceId first = std::max(0, middle - radius);
-    const PlaceId last = std::min(end - 1, middle + radius);
-    std::vector<PlaceId> places;
-    for (PlaceId place = first; place <= last; ++place) places.push_back(place);
-    return places;
-  }
-
   /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
-  /// while.
-  void add_expected(const BinaryContent& content, PlaceId end,
-                    std::vector<Candidate>& candidates) const {
-    for (const PlaceId followed : agreement_.followed_places()) {
-      for (const PlaceId place : around(followed, options_.retrieval.min_spacing, end)) {
-        const bool is_there =
-            std::any_of(candidates.begin(), candidates.end(),
-                        [&](const Candidate& other) { return other.place == place; });
-        if (is_there) continue;
-        const Candidate expected = candidate(place, content);
-        // Nothing is like a frame that could not be read.
-        if (expected.similarity > 0) candidates.push_back(expected);
-      }
+  /// while: the likeliest places of the paths it may be following are looked at, too.
+  void add_expected(const Observation& seen, std::vector<Candidate>& candidates) const {
+    std::vector<Belief> likely;
+    for (const Belief& belief : seen.prior.steps) {
+      if (belief.mass() < kMinExpected) continue;
+      const bool is_there =
+          std::any_of(candidates.begin(), candidates.end(),
+                      [&](const Candidate& c) { return step_of(c.place) == belief.step; });
+      if (!is_there) likely.push_back(belief);
+    }
+    std::stable_sort(likely.begin(), likely.end(),
+                     [](const Belief& a, const Belief& b) { return a.mass() > b.mass(); });
+    likely.resize(std::min(likely.size(), kMaxExpected));
+    for (const Belief& belief : likely) {
+      const PlaceId place =
+          belief.step >= 0 ? recent_view_.place_at(belief.step) : *memory_.place_at(belief.step);
+      const double xi = similarity(seen.content, index_.content(place),
+                                   options_.retrieval.shift_tolerance_columns);
+      // Nothing is like a frame that could not be read.
+      if (xi > 0) candidates.push_back({place, xi});
     }
   }
 
-  [[nodiscard]] std::vector<Candidate> candidates_around(PlaceId middle, int radius, PlaceId end,
-                                                         const BinaryContent& content) const {
-    std::vector<Candidate> candidates;
-    for (const PlaceId place : around(middle, radius, end)) {
-      candidates.push_back(candidate(place, content));
+  /// What the strongest features of each candidate share with the frame.
+  void look_at(Observation& seen, const std::vector<Candidate>& candidates,
+               std::size_t listed) const {
+    FirstLook look;
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      LookedAt place;
+      place.candidate = candidates[i];
+      place.step = step_of(candidates[i].place);
+      place.is_listed = i < listed;
+      verifier_.match_strongest(seen.features, features(place.candidate.place), look);
+      place.shared = look.matches;
+      seen.still.remove_from(place.shared);
+      seen.places.push_back(std::move(place));
     }
-    return candidates;
   }
 
-  /// The best candidate, refined: candidates stand apart, so a place beside it may be the best.
-  [[nodiscard]] VerifiedCandidate refined(const VerifiedCandidate& best, const Observation& seen,
-                                          PlaceId end) const {
-    const CandidateVerifier::Query query = verified_query(seen);
-    const int radius = options_.retrieval.min_spacing;
-    const VerifiedCandidate closest =
-        candidates_.closest(query, best, seen.verified,
-                            candidates_around(best.candidate.place, radius, end, seen.content));
-    return candidates_.located(
-        query, closest, seen.verified,
-        candidates_around(closest.candidate.place, radius + CandidateVerifier::kReach, end,
-                          seen.content));
+  void look_closer(const Observation& seen, LookedAt& place) const {
+    const Features& there = features(place.candidate.place);
+    place.verification.emplace();
+    verifier_.match(seen.features, there, *place.verification);
+    seen.still.remove_from(place.verification->matches);
+    if (options_.decision.count_matches) return;
+    verifier_.find_geometry(seen.features, there, *place.verification);
   }
 
-  [[nodiscard]] Status judged(VerifiedCandidate best, const Observation& seen) const {
-    const auto accepted = [&] {
-      return agreement_.score(best, seen.look.is_step) >= options_.decision.min_score;
+  /// The evidence of all places and, of those that it puts first, of their geometry; then Bayes.
+  void weigh(Observation& seen, PlaceId end) const {
+    seen.posterior = seen.prior;
+    if (seen.places.empty()) return;
+    seen.lesson = null_.weigh(seen.places);
+    const auto update = [&] {
+      seen.evidence = step_evidence(seen.places);
+      seen.posterior = updated(seen.prior, seen.evidence, 1);
     };
-    if (accepted()) return Status::loop;
-    best.distinctness = 1;
-    return accepted() ? Status::ambiguous : reason_of_rejection(best, options_.verification);
+    seen.prior = entered(seen.prior, step_evidence(seen.places), steps_before(end));
+    update();
+    std::vector<std::size_t> order(seen.places.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return seen.posterior.at(seen.places[a].step) > seen.posterior.at(seen.places[b].step);
+    });
+    const auto closer =
+        std::min(order.size(), static_cast<std::size_t>(options_.verification.max_closer_looks));
+    for (std::size_t i = 0; i < closer; ++i) {
+      look_closer(seen, seen.places[order[i]]);
+      null_.weigh_geometry(seen.places[order[i]]);
+    }
+    update();
   }
 
-  void decide(Observation& seen, PlaceId end, Detection& detection) const {
-    if (seen.verified.empty()) {
-      detection.status = end == 0 ? Status::no_earlier_place : Status::no_similar_place;
-      return;
+  /// Of each step, the place that shows most.
+  static std::vector<StepEvidence> step_evidence(const std::vector<LookedAt>& places) {
+    std::vector<StepEvidence> evidence;
+    for (const LookedAt& place : places) evidence.push_back({place.step, place.log_ratio()});
+    std::stable_sort(evidence.begin(), evidence.end(), [](const auto& a, const auto& b) {
+      return std::pair(a.step, -a.log_ratio) < std::pair(b.step, -b.log_ratio);
+    });
+    const auto last = std::unique(evidence.begin(), evidence.end(),
+                                  [](const auto& a, const auto& b) { return a.step == b.step; });
+    evidence.erase(last, evidence.end());
+    return evidence;
+  }
+
+  /// log10 of the odds.
+  static double log_odds(double probability) {
+    constexpr double kLeast = 1e-300;
+    return std::log10(std::max(kLeast, probability)) -
+           std::log10(std::max(kLeast, 1 - probability));
+  }
+
+  void decide(Observation& seen, Detection& detection) const {
+    if (seen.places.empty()) return;
+    const auto rank = [&](std::size_t i) {
+      return std::pair(seen.posterior.at(seen.places[i].step), seen.places[i].log_ratio());
+    };
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < seen.places.size(); ++i) {
+      if (rank(i) > rank(best)) best = i;
     }
-    auto best = *std::max_element(
-        seen.verified.begin(), seen.verified.end(),
-        [&](const auto& a, const auto& b) { return rank(a, seen) < rank(b, seen); });
-    // Below, a neighbour is no likelier to be right than any other place.
-    const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
-    if (score() > options_.decision.chance_evidence) best = refined(best, seen, end);
     seen.best = best;
-    detection.score = score();
-    detection.status = judged(best, seen);
+    if (!seen.places[best].verification) look_closer(seen, seen.places[best]);
+    double same = 0;
+    double rivals = 0;
+    for (const Belief& belief : seen.posterior.steps) {
+      (is_same_place(belief.step, seen.places[best].step) ? same : rivals) += belief.mass();
+    }
+    constexpr double kLeast = 1e-300;
+    const double wrong = rivals + seen.posterior.elsewhere;
+    seen.probability = same / (same + wrong);
+    detection.score = std::log10(std::max(kLeast, same)) - std::log10(std::max(kLeast, wrong));
+    const double known = std::log10(std::max(kLeast, same + rivals)) -
+                         std::log10(std::max(kLeast, seen.posterior.elsewhere));
+    const double least = options_.decision.min_score;
+    detection.status = detection.score >= least ? Status::loop
+                       : known >= least
+                           ? Status::ambiguous
+                           : reason_of_rejection(seen.places[best], options_.verification);
+    tell_match(seen.places[best], detection);
+  }
+
+  /// The paper's own decision: the number of matches alone.
+  void count_matches(Observation& seen, Detection& detection) const {
+    for (std::size_t i = 0; i < seen.places.size(); ++i) {
+      look_closer(seen, seen.places[i]);
+      const auto matches = [&](std::size_t k) {
+        return std::pair(seen.places[k].verification->matches.size(),
+                         seen.places[k].candidate.similarity);
+      };
+      if (!seen.best || matches(i) > matches(*seen.best)) seen.best = i;
+    }
+    if (!seen.best) return;
+    const LookedAt& best = seen.places[*seen.best];
+    detection.score = static_cast<double>(best.verification->matches.size());
+    detection.status = detection.score >= options_.decision.min_score ? Status::loop
+                       : best.verification->matches.size() <
+                               static_cast<std::size_t>(options_.verification.min_matches)
+                           ? Status::few_matches
+                           : Status::low_score;
+    tell_match(best, detection);
+  }
+
+  void tell_match(const LookedAt& best, Detection& detection) const {
     if (best.candidate.place < memory_.session_begin()) {
       detection.earlier_match = memory_.origin(best.candidate.place);
     } else {
       detection.match = best.candidate.place - memory_.session_begin();
     }
     detection.similarity = best.candidate.similarity;
-    detection.matches = best.matches;
-    detection.inliers = best.inliers;
+    detection.matches = static_cast<int>(best.verification->matches.size());
+    detection.inliers = static_cast<int>(best.verification->inliers.size());
   }
 
   LoopDetectorOptions options_;
@@ -437,14 +541,14 @@ class LoopDetector::Impl {
   PlaceMemory memory_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   RecentView recent_view_;
-  int latest_view_inliers_ = 0;  ///< see FrameContext
-  Agreement agreement_;
   KnownLoops known_loops_;
+  Beliefs beliefs_;  ///< after the latest change of view
+  NullModel null_;
+  StillFeatures still_;  ///< of the latest change of view
   // Working memory, which makes const functions unfit for threads.
   mutable SurfExtractor surf_;
   mutable Verifier verifier_;
   mutable Verification verification_;  ///< of the query and a recent place
-  mutable CandidateVerifier candidates_;
 };
 
 LoopDetector::LoopDetector(const LoopDetectorOptions& options) : LoopDetector(options, nullptr) {}
@@ -467,7 +571,7 @@ Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timest
                               std::vector<RankedPlace>* ranking) const {
   Impl::Observation seen;
   Detection detection = impl_->detect(image, timestamp_s, seen);
-  if (ranking) *ranking = impl_->ranked(seen);
+  if (ranking) *ranking = impl_->ranked(seen, detection);
   return detection;
 }
 

@@ -85,10 +85,7 @@ LoopDetectorOptions preset(std::string_view name) {
                        .min_spacing = 1,
                        .max_center_distance_px = 4};
   options.surf.upright = false;
-  options.verification.max_closer_looks = options.retrieval.max_candidates;
   options.decision.min_score = 30;
-  options.decision.agreement_weight = 0;
-  options.decision.followed_ways = 0;
   options.decision.count_matches = true;
   return options;
 }

@@ -59,6 +59,9 @@ class PlaceMemory {
   /// from any step of another session.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
 
+  /// The first place of an earlier session at that step; none in between sessions.
+  [[nodiscard]] std::optional<PlaceId> place_at(std::ptrdiff_t step) const;
+
   /// Throws as MapStorage::add does, and stays as it was.
   void add(const Detection& detection, const BinaryContent& content, Features features,
            const cv::Mat& image);

@@ -30,11 +30,20 @@ RecentView::Look RecentView::look(PlaceId newest, bool is_step,
 
 void RecentView::reserve_next() {
   if (steps_.size() == steps_.capacity()) steps_.reserve(2 * steps_.size() + 1);
+  if (begins_.size() == begins_.capacity()) begins_.reserve(2 * begins_.size() + 1);
 }
 
 void RecentView::remember(PlaceId newest, const Look& look) {
-  if (look.is_step) steps_.push_back(newest);
+  if (look.is_step) {
+    steps_.push_back(newest);
+    begins_.push_back(look.begin);
+  }
   far_step_ = look.far_step;
+}
+
+bool RecentView::in_one_view(std::ptrdiff_t a, std::ptrdiff_t b) const {
+  const auto [first, last] = std::minmax(a, b);
+  return first >= 0 && place_at(first) >= begins_[static_cast<std::size_t>(last)];
 }
 
 std::ptrdiff_t RecentView::step_of(PlaceId place) const {

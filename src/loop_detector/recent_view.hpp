@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <iterator>
 #include <vector>
 
 #include "loopbit/place_index.hpp"
@@ -41,11 +42,21 @@ class RecentView {
   [[nodiscard]] bool empty() const { return steps_.empty(); }
   [[nodiscard]] PlaceId latest_step() const { return steps_.back(); }
 
+  /// The place that made a step: 0 <= step < the number of steps.
+  [[nodiscard]] PlaceId place_at(std::ptrdiff_t step) const {
+    return steps_[static_cast<std::size_t>(step)];
+  }
+  [[nodiscard]] std::ptrdiff_t num_steps() const { return std::ssize(steps_); }
+
+  /// Whether the camera had two steps in view without a break in between.
+  [[nodiscard]] bool in_one_view(std::ptrdiff_t a, std::ptrdiff_t b) const;
+
   /// Where along the path `place` lies, counted in steps.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
 
  private:
   std::vector<PlaceId> steps_;
+  std::vector<PlaceId> begins_;  ///< of each step, see Look::begin
   std::size_t far_step_ = 0;
 };
 

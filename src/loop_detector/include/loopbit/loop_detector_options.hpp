@@ -40,48 +40,23 @@ struct ExclusionOptions {
   }
 };
 
-/// The one rule that accepts a match: score >= min_score.
+/// The one rule that accepts a match: score >= min_score, where the score is log10 of the odds that
+/// the match is right. 2 = 100 to 1, a probability of 0.99: a wrong loop bends the whole map, and
+/// of loops that are barely accepted one in a hundred may be wrong; most are far surer.
 struct DecisionOptions {
-  double min_score = 15;
-  double full_share = 0.1;
-  int full_steps = 200;
-  int full_view_inliers = 40;
-  bool distinctness = true;
-  double chance_evidence = 6.0;
-  double agreement_weight = 0.5;
-  double agreement_memory = 0.8;
-  int followed_ways = 3;
+  double min_score = 2;
+  double leave_probability = 0.001;
   bool count_matches = false;
 
   static constexpr auto fields() {
     using S = DecisionOptions;
     return std::tuple{
-        Field{"min_score", &S::min_score, 1.0, 1e9, "smallest score of an accepted match"},
-        Field{"full_share", &S::full_share, 0.0, 1.0,
-              "inliers count in full where they are this share of the features amid them, and by "
-              "sqrt(share / full_share) where they are less; 0 = always"},
-        Field{"full_steps", &S::full_steps, 1, 1'000'000,
-              "inliers count in full once the map holds so many changes of view, and before by its "
-              "logarithm; 1 = always"},
-        Field{"full_view_inliers", &S::full_view_inliers, 1, 1'000'000,
-              "inliers count in full where a view shares at most so many distinct ones with the "
-              "change of view before, and full_view_inliers / n, but at least half, where it is n"},
-        switch_field("distinctness", &S::distinctness,
-                     "an inlier counts less if other places have it, too"),
-        Field{"chance_evidence", &S::chance_evidence, 0.0, 1000.0,
-              "evidence that different places show by chance; no more supports nothing"},
-        Field{"agreement_weight", &S::agreement_weight, 0.0, 1.0,
-              "what the support of the changes of view before adds to the score; 0 = each frame "
-              "alone"},
-        Field{"agreement_memory", &S::agreement_memory, 0.0, 0.99,
-              "part of the support that is left after each further change of view"},
-        Field{
-            "followed_ways", &S::followed_ways, 0, 1000,
-            "ways along the past with most support that are followed: places where they go on are "
-            "candidates whether they look alike or not; 0 = none"},
+        Field{"min_score", &S::min_score, 0.0, 1e9,
+              "smallest score of an accepted match: log10 of the odds that it is right"},
+        Field{"leave_probability", &S::leave_probability, 0.0, 0.5,
+              "chance that a robot on an earlier path leaves it at a change of view"},
         switch_field("count_matches", &S::count_matches,
-                     "the evidence is the number of matches alone, without geometry, as in the "
-                     "paper")};
+                     "the score is the number of matches alone, as in the paper")};
   }
 };
 

@@ -29,7 +29,7 @@ struct Candidate {
 inline constexpr double kMaxCenterDistance_px = 90.0;
 
 struct RetrievalOptions {
-  int max_candidates = 30;
+  int max_candidates = 20;
   double min_similarity = 0.2;
   int shift_tolerance_columns = 4;
   int min_spacing = 3;

@@ -24,9 +24,9 @@ struct Match {
 };
 
 struct VerificationOptions {
-  int first_look_keypoints = 300;
-  int max_closer_looks = 5;
-  double max_ratio = 0.8;
+  int first_look_keypoints = 400;
+  int max_closer_looks = 3;
+  double max_ratio = 0.85;
   int min_matches = 8;
   double max_epipolar_error_px = 2.0;
   double min_spacing_scales = 10.0;
@@ -37,8 +37,7 @@ struct VerificationOptions {
         Field{"first_look_keypoints", &S::first_look_keypoints, 16, 10000,
               "strongest keypoints of either image that tell which candidates to look at closer"},
         Field{"max_closer_looks", &S::max_closer_looks, 1, 1'000'000,
-              "candidates whose keypoints are all matched; others only where they seem to share "
-              "what these have"},
+              "likeliest candidates whose keypoints are all matched, and their geometry sought"},
         Field{"max_ratio", &S::max_ratio, 0.1, 1.0,
               "a match is kept if its distance is less than this part of the second best"},
         Field{"min_matches", &S::min_matches, 8, 1000, "with fewer matches no geometry is sought"},
