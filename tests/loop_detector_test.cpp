@@ -300,14 +300,6 @@ TEST(LoopDetector, AFirstLookFindsAsManyLoopsInRealImages) {
 
 // Places that look alike
 
-/// A picture of `scene` with the left half of `common`.
-cv::Mat1b half_shared(int scene, int common) {
-  cv::Mat1b picture = view(scene).clone();
-  const cv::Rect left(0, 0, picture.cols / 2, picture.rows);
-  view(common)(left).copyTo(picture(left));
-  return picture;
-}
-
 TEST(LoopDetector, LapsThroughOnePlaceAreNotAmbiguous) {
   LoopDetector detector(fast_options());
   for (int lap = 0; lap < 4; ++lap) {

@@ -283,9 +283,9 @@ LoopDetectorOptions changed_options() {
   options.binary_content.blur_sigma_px += 1;
   options.retrieval = {7, 0.1, 2, 9};
   options.surf = {8000, 123, false};
-  options.verification = {40, 3, 0.75, 11, 1.3, 4.5};
+  options.verification = {40, 4, 0.75, 11, 1.3, 4.5};
   options.exclusion = {5, 40, 0.0, 17};
-  options.decision = {33.3, 0.2, 99, 55, false, 6.5, 0.1, 0.5, true};
+  options.decision = {33.3, 0.2, true};
   return options;
 }
 
