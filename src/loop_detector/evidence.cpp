@@ -138,19 +138,21 @@ void NullModel::reserve_next(std::size_t places) {
   if (places + 1 > columns_.capacity()) columns_.reserve(2 * places + 1);
 }
 
-void NullModel::learn_rows(const Lesson& lesson, const std::vector<LookedAt>& places) {
+void NullModel::learn_rows(const Lesson& lesson) {
   const double kept = 1 - 1 / kRowMemory;
   root_sq_ = kept * root_sq_ + lesson.places * lesson.root_spread_sq;
   content_sq_ = kept * content_sq_ + lesson.places * lesson.content_spread_sq;
   row_weight_ = kept * row_weight_ + lesson.places;
+}
+
+void NullModel::learn_column(const Lesson& lesson, const LookedAt& place, double weight) {
+  const auto number = static_cast<std::size_t>(place.candidate.place);
+  if (number >= columns_.size()) return;
   const double most = kMostDeviation * lesson.root_spread;
-  for (const LookedAt& place : places) {
-    Column& column = columns_[static_cast<std::size_t>(place.candidate.place)];
-    const double above =
-        std::sqrt(static_cast<double>(place.shared.size()) + kRootShift) - lesson.root_middle;
-    column.sum += static_cast<float>(std::clamp(above, -most, most));
-    column.count += 1;
-  }
+  const double above =
+      std::sqrt(static_cast<double>(place.shared.size()) + kRootShift) - lesson.root_middle;
+  columns_[number].sum += static_cast<float>(weight * std::clamp(above, -most, most));
+  columns_[number].count += static_cast<float>(weight);
 }
 
 }  // namespace loopbit

@@ -81,12 +81,13 @@ class NullModel {
   /// not throw.
   template <typename Doubt>
   void learn(const Lesson& lesson, const std::vector<LookedAt>& places, const Doubt& doubt) {
-    learn_rows(lesson, places);
+    learn_rows(lesson);
     double weight = 1;
     double excess = 0;
     for (const LookedAt& place : places) {
-      if (place.excess() == 0) continue;
       const double doubted = doubt(place);
+      learn_column(lesson, place, doubted);
+      if (place.excess() == 0) continue;
       if (doubted * place.excess() * place.excess() <= weight * excess * excess && excess > 0) {
         continue;
       }
@@ -103,7 +104,8 @@ class NullModel {
     float count = 0;  ///< frames that looked at it
   };
 
-  void learn_rows(const Lesson& lesson, const std::vector<LookedAt>& places);
+  void learn_rows(const Lesson& lesson);
+  void learn_column(const Lesson& lesson, const LookedAt& place, double weight);
 
   std::vector<Column> columns_;  ///< by place
   double root_sq_ = 0;

@@ -129,8 +129,9 @@ class LoopDetector::Impl {
     std::vector<LookedAt> places;
     NullModel::Lesson lesson;
     std::vector<StepEvidence> evidence;
-    Beliefs prior;                    ///< where the camera is before the frame is looked at
-    Beliefs posterior;                ///< and after
+    Beliefs expected;   ///< where the camera is by the frames before
+    Beliefs prior;      ///< the same, where it may have entered an earlier path just now
+    Beliefs posterior;  ///< and after
     std::optional<std::size_t> best;  ///< of `places`
     double probability = 0;           ///< that the best is right
   };
@@ -155,7 +156,8 @@ class LoopDetector::Impl {
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, timestamp_s);
     find_still(seen);
-    seen.prior = expected(seen.look.is_step, end);
+    seen.expected = expected(seen.look.is_step, end);
+    seen.prior = seen.expected;
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
@@ -240,6 +242,7 @@ class LoopDetector::Impl {
     known_loops_.take(found);
     if (!seen.look.is_step) return;
     beliefs_ = std::move(beliefs);
+    expected_ = std::move(seen.expected);
     still_ = std::move(seen.still);
     if (seen.evidence.empty()) return;
     null_.learn(seen.lesson, seen.places, [&](const LookedAt& looked_at) {
@@ -343,14 +346,15 @@ class LoopDetector::Impl {
     seen.still = StillFeatures(seen.features, still_, verification_.matches, seen.look.is_step);
   }
 
-  /// Where the camera is before the frame is looked at. One at rest is where it was.
+  /// Where the camera is before the frame is looked at. One at rest shows what the latest change of
+  /// view showed, which is no second witness.
   [[nodiscard]] Beliefs expected(bool is_step, PlaceId end) const {
     const std::ptrdiff_t end_step = end > memory_.session_begin() ? step_of(end - 1) + 1 : 0;
     const auto exists = [&](std::ptrdiff_t step) {
       return step >= 0 ? step < end_step : memory_.place_at(step).has_value();
     };
     return is_step ? moved(beliefs_, options_.decision.leave_probability, exists)
-                   : only(beliefs_, exists);
+                   : only(expected_, exists);
   }
 
   /// Places that are no rivals: near on the path, in one view, or laps that loops found before
@@ -501,6 +505,13 @@ class LoopDetector::Impl {
                        : known >= least
                            ? Status::ambiguous
                            : reason_of_rejection(seen.places[best], options_.verification);
+    if (seen.places[best].geometry_log_ratio <= 0) {
+      // A loop needs a geometry, whatever the path says: without, the odds are even at best.
+      detection.score = std::min(detection.score, 0.0);
+      if (detection.score < least && detection.status == Status::loop) {
+        detection.status = Status::no_geometry;
+      }
+    }
     tell_match(seen.places[best], detection);
   }
 
@@ -542,7 +553,8 @@ class LoopDetector::Impl {
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   RecentView recent_view_;
   KnownLoops known_loops_;
-  Beliefs beliefs_;  ///< after the latest change of view
+  Beliefs beliefs_;   ///< after the latest change of view
+  Beliefs expected_;  ///< and before it
   NullModel null_;
   StillFeatures still_;  ///< of the latest change of view
   // Working memory, which makes const functions unfit for threads.
