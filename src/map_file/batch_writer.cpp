@@ -114,12 +114,12 @@ void BatchWriter::commit_batches() {
 }
 
 void BatchWriter::commit(const std::vector<AddedFrame>& batch) {
-  begin_commit(*database_);
+  Commit commit(*database_);
   if (!rows_) rows_.emplace(*database_);
   session_.frames = batch.back().detection.frame + 1;
   rows_->write(session_);
   for (const AddedFrame& frame : batch) write(frame);
-  database_->execute("COMMIT");
+  commit.end();
 }
 
 void BatchWriter::write(const AddedFrame& frame) {

@@ -47,7 +47,7 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
   for (const MapSession& session : plan.sessions) numbers[session.session] = session.session;
   MapCopy copy(to, std::move(numbers));
   MapCheck counts;
-  begin_commit(to);
+  std::optional<Commit> commit(std::in_place, to);
   for (const MapSession& session : plan.sessions) copy.copy_session(session);
   counts.sessions = static_cast<std::int64_t>(plan.sessions.size());
   from.for_each_place([&](const MapPlace& place) {
@@ -57,12 +57,12 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
     if (!features || !copy.copy_place(place, *features, image)) return;
     counts.images += image.has_value();
     if (++counts.places % kPlacesPerTransaction == 0) {
-      to.execute("COMMIT");
-      begin_commit(to);
+      commit->end();
+      commit.emplace(to);
     }
   });
   for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);
-  to.execute("COMMIT");
+  commit->end();
   return counts;
 }
 

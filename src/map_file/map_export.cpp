@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "loopbit/map_tools.hpp"
+#include "loopbit/printable.hpp"
 
 namespace loopbit {
 namespace {
@@ -70,7 +71,7 @@ std::string json(const MapReader& map, const std::vector<Edge>& edges) {
                              {"matches", loop.matches},
                              {"inliers", loop.inliers}});
   }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+  return printable_json(json.dump(2, ' ', false, Json::error_handler_t::replace)) + '\n';
 }
 
 /// g2o's text format (github.com/RainerKuemmerle/g2o, "File format"): a vertex or edge a line.

@@ -61,14 +61,6 @@ void refuse_unfinished(const std::string& from) {
                                             from));
 }
 
-/// Leaves the transaction, if it is not left already.
-void undo(const Database& database) {
-  try {
-    database.execute("ROLLBACK");
-  } catch (const Error&) {
-  }
-}
-
 /// Adds what `into` does not have of `source`, in one transaction.
 MergeCounts merge(const std::string& into, const Database& to, MapReader& source) {
   const MergePlan plan = plan_of(into, to, source);
@@ -76,28 +68,27 @@ MergeCounts merge(const std::string& into, const Database& to, MapReader& source
   for (const MapSession& session : plan.added) added.insert(session.session);
 
   MergeCounts counts{.sessions = static_cast<std::int64_t>(added.size()), .known = plan.known};
-  begin_commit(to);
-  try {
-    MapCopy copy(to, plan.numbers);
-    std::int64_t id = next_place(to);
-    for (const MapSession& session : plan.added) copy.copy_session(session);
-    source.for_each_place([&](const MapPlace& place) {
-      if (!added.contains(place.at.session)) return;
-      const auto features = source.features_of(place);
-      if (!features) return;
-      MapPlace copied = place;
-      copied.id = id++;
-      counts.places += copy.copy_place(copied, *features, source.image_of(place));
-    });
-    for (const MapLoop& loop : source.loops()) {
-      if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
-    }
-    refuse_damaged(source.path(), source.damage());
-    to.execute("COMMIT");
-  } catch (const Error&) {
-    undo(to);
-    throw;
+  if (!has_log(to)) {  // or readers would have to wait for the whole commit
+    mark(to);
+    begin_log(to);
   }
+  Commit commit(to);
+  MapCopy copy(to, plan.numbers);
+  std::int64_t id = next_place(to);
+  for (const MapSession& session : plan.added) copy.copy_session(session);
+  source.for_each_place([&](const MapPlace& place) {
+    if (!added.contains(place.at.session)) return;
+    const auto features = source.features_of(place);
+    if (!features) return;
+    MapPlace copied = place;
+    copied.id = id++;
+    counts.places += copy.copy_place(copied, *features, source.image_of(place));
+  });
+  for (const MapLoop& loop : source.loops()) {
+    if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
+  }
+  refuse_damaged(source.path(), source.damage());
+  commit.end();
   return counts;
 }
 

@@ -123,12 +123,11 @@ int checked_version(const Database& database) {
 /// Versions so far add tables; an empty file has version 0.
 void migrate(const Database& database, int from, int to) {
   if (from >= to) return;
-  database.execute("BEGIN IMMEDIATE");
   for (const Table& table : kTables) {
     if (table.since > from && table.since <= to) database.execute(table.definition);
   }
-  database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}; COMMIT",
-                               kMapApplicationId, to));
+  database.execute(
+      fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kMapApplicationId, to));
 }
 
 /// Opens a file, made if there is none, with the right to write it.
@@ -180,20 +179,37 @@ Database open_map_for_writing(const std::string& path, int version) {
   close_log(database);  // of a run that was killed
   // Throws if nothing can be written, or if a long read would keep the log from beginning.
   database.execute("BEGIN EXCLUSIVE; ROLLBACK");
-  if (found == 0) migrate(database, found, version);
+  if (found == 0) {
+    database.execute("BEGIN IMMEDIATE");
+    migrate(database, found, version);
+    database.execute("COMMIT");
+  }
   return database;
 }
 
-void begin_commit(const Database& database) {
-  const bool is_logged = has_log(database);
+Commit::Commit(const Database& database) : Commit(database, has_log(database)) {
+  write_header(database);
   migrate(database, static_cast<int>(database.integer("PRAGMA user_version")), kMapVersion);
-  // Writes the first page, see map_log.hpp.
-  const std::string touch = fmt::format("PRAGMA user_version = {}", kMapVersion);
-  if (!is_logged) {
-    begin_log(database);
-    database.execute(touch);  // so that it comes first, and is soon found
+  if (!is_logged_) mark(database);
+}
+
+Commit::Commit(const Database& database, bool is_logged)
+    : database_(database), is_logged_(is_logged) {
+  database.execute("BEGIN IMMEDIATE");
+}
+
+Commit::~Commit() {
+  if (has_ended_) return;
+  try {
+    database_.execute("ROLLBACK");
+  } catch (const Error&) {  // SQLite has left it already
   }
-  database.execute("BEGIN IMMEDIATE; " + touch);
+}
+
+void Commit::end() {
+  database_.execute("COMMIT");
+  has_ended_ = true;
+  if (!is_logged_) begin_log(database_);
 }
 
 bool is_being_written(const std::string& path) { return OpenFile(path).is_locked(); }

@@ -25,9 +25,28 @@ inline constexpr int kMapPageBytes = 16384;
 /// made, to repair an older one by.
 Database open_map_for_writing(const std::string& path, int version = kMapVersion);
 
-/// Begins a transaction of a map that is open to be written, which is brought to kMapVersion. What
-/// is committed survives the loss of power, and is seen by readers.
-void begin_commit(const Database& database);
+/// A transaction of a map that is open for writing, which it brings to kMapVersion. Unless it ends,
+/// it changes nothing. The first one of a map without a log goes to the file itself, where damage
+/// that it meets leaves no trace; the log begins when it ends.
+class Commit {
+ public:
+  explicit Commit(const Database& database);
+  ~Commit();
+  Commit(const Commit&) = delete;
+  Commit& operator=(const Commit&) = delete;
+  Commit(Commit&&) = delete;
+  Commit& operator=(Commit&&) = delete;
+
+  /// What is committed survives the loss of power, and is seen by readers.
+  void end();
+
+ private:
+  Commit(const Database& database, bool is_logged);
+
+  const Database& database_;
+  bool is_logged_;
+  bool has_ended_ = false;
+};
 
 /// Whether this process or another has the map open to be written. Throws Error (kind input) if
 /// there is none.

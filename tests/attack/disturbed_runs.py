@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 
+from damaged_files import saved
 from harness import LOOPBIT, Skipped, attack, contents, decided_alike, decisions, rows, running
 from material import FRAMES, REPOSITORY, TINY, map_rows
 
@@ -147,7 +148,7 @@ def file_limit(case):
     """No file may grow beyond a limit (RLIMIT_FSIZE), whatever writes it."""
     material = case.material
     path, run = mapped_run(case, case.folder, "--overwrite")
-    new, before = case.folder / "new", contents(path)
+    new, before = case.folder / "new", saved(path)
     command = case.pick([run, ["run", material.images, "--out", new], [
         "report", material.run, "--out", new], ["map", "export", path, "--out", new], [
         "map", "merge", new, path], ["map", "merge", path, material.other_map], [
@@ -158,7 +159,7 @@ def file_limit(case):
     if command[:2] != ["map", "compact"] or ran.code:
         check_saved(case, path)
     if ran.code and command[0] == "map":
-        case.expect(contents(path) == before, f"{case.words(ran)}: failed, and changed the map")
+        case.expect(saved(path) == before, f"{case.words(ran)}: failed, and changed the map")
 
 
 @attack(1)
