@@ -53,6 +53,37 @@ def killed_run(case):
     check_saved(case, path)
 
 
+def files_in(*folders):
+    return {path.name: contents(path) for folder in folders if folder.is_dir()
+            for path in folder.iterdir() if path.is_file()}
+
+
+@attack(3)
+def killed_overwrite(case):
+    """SIGKILL at random moments of runs that replace one another: the last whole one is kept."""
+    out = case.folder / "out"
+    shutil.copytree(case.material.run, out)
+    kept = files_in(out)
+    for number in range(3):
+        process = case.start("run", case.material.images, "--out", out, "--overwrite",
+                             *case.random.choice([["--no-report"], ["--limit", 5], []]))
+        time.sleep(case.random.choice([0.1, 1]) * case.random.uniform(0, case.material.run_seconds))
+        os.kill(process.pid, signal.SIGKILL)
+        case.finish(process)
+        record = out / "run.json"
+        if record.exists() and json.loads(record.read_text())["stopped_by"] == "end":
+            case.loopbit("eval", out, "--truth", case.material.truth, codes=(0,))
+            kept = files_in(out)
+            continue
+        aside, moved = files_in(out / "earlier_run"), files_in(out / "earlier_run.part", out)
+        case.expect(aside == kept or kept.items() <= moved.items(),
+                    f"after kill {number}: neither the run before nor the new one is whole")
+    case.loopbit("run", case.material.images, "--out", out, "--overwrite", "--no-report",
+                 codes=(0,))
+    case.expect(not (out / "earlier_run").exists(), "the replaced run is still there")
+    decided_alike(case, out, decisions(case.material.run), "after kills")
+
+
 @attack(1)
 def killed_writers(case):
     """Twelve kills by tests/map_crash_test.py."""
