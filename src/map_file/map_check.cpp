@@ -199,7 +199,8 @@ MapCheck check_map(const std::string& path) {
 
 MapCheck recover_map(const std::string& from, const std::string& to) {
   std::error_code error;
-  if (fs::exists(to, error)) throw is_there(to);
+  // A link that leads nowhere is somebody's, too.
+  if (fs::exists(fs::symlink_status(to, error))) throw is_there(to);
   // Under its name there is only a whole one, whenever this is killed.
   const std::string part = to + ".part";
   if (fs::exists(part, error) && is_being_written(part)) {
