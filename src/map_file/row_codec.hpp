@@ -16,7 +16,7 @@ namespace loopbit {
 // How a map's values become bytes; docs/format.md describes the same. All numbers are
 // little-endian.
 
-/// CRC-32 (zlib's) over values in turn.
+/// CRC-32, as zlib computes it, of values in turn.
 class Checksum {
  public:
   Checksum& add(std::int64_t value);
