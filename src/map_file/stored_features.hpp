@@ -4,16 +4,44 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <list>
 #include <memory>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 #include "loopbit/database.hpp"
+#include "loopbit/place_index.hpp"
+#include "loopbit/surf.hpp"
 
-#include "feature_cache.hpp"
 #include "map_rows.hpp"
 
 namespace loopbit {
+
+/// The features of the places used last, up to a number of bytes.
+class FeatureCache {
+ public:
+  explicit FeatureCache(std::size_t max_bytes) : max_bytes_(max_bytes) {}
+
+  /// Null if they are not there.
+  std::shared_ptr<const Features> find(PlaceId place);
+
+  /// Stays as it was where memory is refused (std::bad_alloc).
+  void add(PlaceId place, std::shared_ptr<const Features> features);
+
+  [[nodiscard]] std::size_t bytes() const { return bytes_; }
+
+ private:
+  struct Entry {
+    PlaceId place;
+    std::shared_ptr<const Features> features;
+  };
+
+  std::size_t max_bytes_;
+  std::size_t bytes_ = 0;
+  std::list<Entry> entries_;  ///< the one used last comes first
+  std::unordered_map<PlaceId, std::list<Entry>::iterator> at_;
+};
 
 /// The features of a map's places by the number a detector knows them by; those used last are kept.
 class StoredFeatures {

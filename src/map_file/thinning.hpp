@@ -3,10 +3,13 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "loopbit/binary_content.hpp"
+#include "loopbit/map_tools.hpp"
 
 namespace loopbit {
 
@@ -24,5 +27,8 @@ struct ThinnedPlace {
 /// Removing it costs 1 - xi, and what those that it stands for itself have cost. The cheapest goes
 /// first, until the budget is met. Cost: some 10 microseconds a place.
 std::vector<bool> kept_places(const std::vector<ThinnedPlace>& places, std::size_t max_places);
+
+/// The ids of the places that compacting a map leaves.
+std::set<std::int64_t> remaining_places(MapReader& map, const CompactOptions& options);
 
 }  // namespace loopbit
