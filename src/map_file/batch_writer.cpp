@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kFramesPerBatch = 32;
 constexpr std::chrono::seconds kMaxDelay{1};
-/// 12 MB of features, and 50 MB of images where these are kept.
+/// 12 MB of features, and 50 MB of images if these are saved.
 constexpr std::size_t kMaxPendingFrames = 256;
 
 MapLoop loop_of(const Detection& detection, int session) {

@@ -16,7 +16,7 @@
 namespace loopbit {
 namespace {
 
-/// The places that images are listed of, in order.
+/// The places that have an image, in order.
 std::vector<std::int64_t> listed_images(const std::string& path, Damage& damage) {
   std::vector<std::int64_t> places;
   for_each_image(
@@ -30,8 +30,8 @@ std::vector<std::int64_t> listed_images(const std::string& path, Damage& damage)
 MapCheck check_map(const std::string& path) {
   MapReader map(path);
   MapCheck check{.sessions = static_cast<std::int64_t>(map.sessions().size())};
-  // A writer may add to the map in between: images are listed before their places, and sessions
-  // looked for after them.
+  // A writer may add to the map meanwhile. So images are listed before their places, and sessions
+  // after them.
   Damage damage;
   const std::vector<std::int64_t> images = listed_images(path, damage);
   std::vector<std::int64_t> places;

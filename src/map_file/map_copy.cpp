@@ -80,15 +80,15 @@ class MapCopy {
   std::map<int, int> numbers_;
 };
 
-/// What of a map is copied.
+/// Which rows of a map are copied.
 struct CopyPlan {
   std::vector<MapSession> sessions;  ///< with their loops
   std::function<bool(const MapPlace&)> keeps_place;
   bool keeps_images = true;
 };
 
-/// Copies what is planned to a new map that nobody can see yet, under the same numbers. Says what
-/// was copied.
+/// Copies the planned rows under the same numbers to a new map that nobody can see yet. Returns the
+/// counts of copied rows.
 MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
   std::map<int, int> numbers;
   for (const MapSession& session : plan.sessions) numbers[session.session] = session.session;
@@ -117,14 +117,14 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
 
 // Merging.
 
-/// Which sessions go where.
+/// Which sessions are added, and under which numbers.
 struct MergePlan {
-  std::map<int, int> numbers;     ///< of each session in the other map: in this one
+  std::map<int, int> numbers;     ///< from numbers in the other map to numbers in this one
   std::vector<MapSession> added;  ///< those that this one lacks
-  std::int64_t known = 0;         ///< the others
+  std::int64_t known = 0;         ///< the number of other sessions
 };
 
-/// Throws Error (kind option) where settings differ.
+/// Throws Error (kind option) if settings differ.
 MergePlan plan_of(const std::string& into, const Database& to, const MapReader& source) {
   Damage damage;
   std::map<std::string, int> known;
@@ -133,7 +133,7 @@ MergePlan plan_of(const std::string& into, const Database& to, const MapReader& 
     known[session.uid] = session.session;
     options = session.options;
   }
-  refuse_damaged(into, damage.clauses());  // a session of unknown uid would be added twice
+  refuse_damaged(into, damage.clauses());  // a session with an unknown uid could be added twice
   MergePlan plan;
   int next = next_session(to);
   for (const MapSession& session : source.sessions()) {
@@ -151,7 +151,7 @@ MergePlan plan_of(const std::string& into, const Database& to, const MapReader& 
   return plan;
 }
 
-/// A session that is not whole would be taken for known by the next merge.
+/// The next merge would take an incomplete session for a known one.
 void refuse_unfinished(const std::string& from) {
   if (!is_being_written(from)) return;
   throw Error(ErrorKind::input, fmt::format("'{}' is being written: only a part of its session "
@@ -159,14 +159,14 @@ void refuse_unfinished(const std::string& from) {
                                             from));
 }
 
-/// Adds what `into` does not have of `source`, in one transaction.
+/// Adds the sessions of `source` that `into` lacks, in one transaction.
 MergeCounts merge(const std::string& into, const Database& to, MapReader& source) {
   const MergePlan plan = plan_of(into, to, source);
   std::set<int> added;
   for (const MapSession& session : plan.added) added.insert(session.session);
 
   MergeCounts counts{.sessions = static_cast<std::int64_t>(added.size()), .known = plan.known};
-  if (!has_log(to)) {  // or readers would have to wait for the whole commit
+  if (!has_log(to)) {  // otherwise readers would wait for the whole commit
     mark(to);
     begin_log(to);
   }
@@ -193,11 +193,11 @@ MergeCounts merge(const std::string& into, const Database& to, MapReader& source
 
 // Recovering.
 
-/// Sessions whose description is lost are given one.
+/// All sessions; those whose description is lost get a new one.
 std::vector<MapSession> all_sessions(MapReader& map) {
   std::map<int, MapSession> sessions;
   for (const MapSession& session : map.sessions()) sessions[session.session] = session;
-  if (sessions.empty()) return {};  // nothing says what the places were made with
+  if (sessions.empty()) return {};  // the settings of the places are unknown
   const MapSession pattern = sessions.begin()->second;
   map.for_each_place([&](const MapPlace& place) {
     auto [found, is_new] = sessions.try_emplace(place.at.session, pattern);
@@ -216,8 +216,8 @@ std::vector<MapSession> all_sessions(MapReader& map) {
   return list;
 }
 
-/// A copy of a map whose first page, where the tables are listed, cannot be read, with that page
-/// from a new map: tables begin at the same pages in every map. Removed when this is.
+/// A temporary copy of a map whose first page, which lists the tables, cannot be read. That page is
+/// taken from a new map, since tables begin at the same pages in every map.
 class RepairedCopy {
  public:
   explicit RepairedCopy(std::string path) : path_(std::move(path)) {}
@@ -244,7 +244,7 @@ class RepairedCopy {
  private:
   using Page = std::array<char, kMapPageBytes>;
 
-  /// Of a map without rows, but of so many bytes.
+  /// The first page of an empty map, but for the number of pages, which is that of `bytes`.
   [[nodiscard]] Page first_page(std::uintmax_t bytes, int version) const {
     close_log(open_map_for_writing(path_, version));
     Page page{};
@@ -290,10 +290,10 @@ Error is_there(const std::string& path) {
   return {ErrorKind::output, fmt::format("'{}' exists; name a new file to recover to.", path)};
 }
 
-/// Throws Error (kind output) where there is a file by now.
+/// Throws Error (kind output) if `to` exists by now.
 void rename_to_new(const std::string& from, const std::string& to) {
   int failed = renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE);
-  // Not every file system can tell.
+  // Not every file system supports RENAME_NOREPLACE.
   if (failed != 0 && errno == EINVAL) failed = rename(from.c_str(), to.c_str());
   if (failed == 0) return;
   throw errno == EEXIST ? is_there(to) : cannot_write(to, errno);
@@ -308,7 +308,7 @@ MapCheck recover_to_new(const std::string& from, const std::string& to) {
   }
   const RepairedCopy copy(to + ".repaired");
   copy.make(from, kMapVersion);
-  // Another page is where images begin, or there are none.
+  // Perhaps the map began with version 1, where images begin at another page.
   if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
   MapReader source(copy.path());
   MapCheck check = copy_to_new(source, to);
@@ -332,7 +332,7 @@ std::vector<MapSession> sessions_but(const MapReader& map, const std::vector<int
   return sessions;
 }
 
-/// Keys are never given twice, not even those of what was dropped last.
+/// Keys are never reused, not even those of the rows dropped last.
 void keep_sequences(const Database& from, const Database& to) {
   for (const char* table : {"session", "place"}) {
     const auto last =
@@ -354,7 +354,7 @@ void make_alike(const std::string& part, const std::string& path) {
   struct stat old {};
   const bool is_alike = stat(path.c_str(), &old) == 0 && fchmod(file, old.st_mode & kAllModes) == 0;
   const int reason = errno;
-  // Only root gives files away; others may give them to a group of theirs.
+  // Only root may change the owner; others may choose a group of theirs.
   const bool is_given = is_alike && (fchown(file, old.st_uid, old.st_gid) == 0 ||
                                      fchown(file, geteuid(), old.st_gid) == 0);
   (void)is_given;
@@ -380,7 +380,7 @@ void write_compact(const Database& old, const std::string& part, const CompactOp
   close_log(compact);
 }
 
-/// The log of the old file would be taken for the new one's.
+/// A log beside the old file would be taken for that of the new one.
 void check_unused(const Database& old) {
   if (!close_log(old)) {
     throw Error(ErrorKind::output,
@@ -411,16 +411,16 @@ MergeCounts merge_map(const std::string& into, const std::string& from) {
 
 MapCheck recover_map(const std::string& from, const std::string& to) {
   std::error_code error;
-  // A link that leads nowhere is somebody's, too.
+  // A broken symbolic link is not replaced, either.
   if (fs::exists(fs::symlink_status(to, error))) throw is_there(to);
-  // Under its name there is only a whole one, whenever this is killed.
+  // The map gets its name when it is complete, so a kill leaves no half of one.
   const std::string part = to + ".part";
   if (fs::exists(part, error) && is_being_written(part)) {
     throw Error(ErrorKind::output,
                 fmt::format("'{}' is being recovered by another run; wait until that ends.", to));
   }
   remove_database(part);
-  remove_database(to);  // a log of a map that was there
+  remove_database(to);  // the log of an earlier map
   try {
     MapCheck check = recover_to_new(from, part);
     if (check.sessions > 0 || check.damage.empty()) {
@@ -438,7 +438,7 @@ MapCheck recover_map(const std::string& from, const std::string& to) {
 }
 
 CompactCounts compact_map(const std::string& path, const CompactOptions& options) {
-  (void)open_map_for_reading(path);  // or one would be made
+  (void)open_map_for_reading(path);  // it must exist
   const Database old = open_map_for_writing(path);
   const std::string file = resolved_path(path);
   const std::string part = file + ".compact";

@@ -25,8 +25,7 @@
 namespace loopbit {
 namespace {
 
-// sqlite.org/fileformat2.html, 1.3: where the header says how the file is written and read, how
-// large its pages are, and the mark.
+// Offsets in the header, sqlite.org/fileformat2.html, 1.3. The mark is at SQLite's "schema cookie".
 constexpr std::size_t kWriteVersionAt = 18;
 constexpr std::size_t kReadVersionAt = 19;
 constexpr std::size_t kPageBytesAt = 16;
@@ -36,8 +35,8 @@ constexpr std::size_t kMarkAt = 40;
 constexpr unsigned char kWithoutLog = 1;
 constexpr unsigned char kWithLog = 2;
 
-/// What is smaller counts the changes of tables: SQLite's own use of the place. A mark is a random
-/// number above these bits and, in them, that of the mark before.
+/// A mark is a random number in the upper bits; the lower bits repeat the random number of the mark
+/// before. Smaller values are SQLite's own, which counts changes of tables there.
 constexpr unsigned kMarkBits = 16;
 constexpr std::uint32_t kLeastMark = 1U << kMarkBits;
 constexpr std::uint32_t kNoMark = 0;
@@ -58,7 +57,7 @@ bool read(std::istream& file, std::span<unsigned char> bytes) {
   return static_cast<bool>(file);
 }
 
-/// The frames of a log, one after the other, as far as they are whole.
+/// The frames of a log in order, up to the first damaged one.
 class Log {
  public:
   explicit Log(const std::string& path) : file_(path, std::ios::binary) {
@@ -107,7 +106,7 @@ class Log {
   }
 
   std::ifstream file_;
-  bool is_big_endian_ = false;  ///< what is summed up
+  bool is_big_endian_ = false;  ///< byte order of the checksums
   std::uint32_t page_bytes_ = 0;
   std::array<unsigned char, 8> salts_{};
   std::array<std::uint32_t, 2> sums_{};
@@ -115,14 +114,14 @@ class Log {
   std::vector<unsigned char> page_;
 };
 
-/// What a log says of the file it is the log of.
+/// What a log says about its map.
 struct Origin {
-  bool is_empty = true;  ///< SQLite would find nothing in it
+  bool is_empty = true;  ///< SQLite would read nothing from it
   std::uint32_t mark = kNoMark;
   std::uint32_t page_bytes = 0;
 };
 
-/// Reads no more than it must: the first page comes first in a commit that is not very large.
+/// Reads up to the map's first page, which comes first in a commit unless that is very large.
 Origin origin_of(const std::string& log_path) {
   Log log(log_path);
   Origin origin;
@@ -142,13 +141,13 @@ std::uint32_t page_bytes_of(const Database::Header& header) {
   return value == 1 ? 65536 : value;
 }
 
-/// Whether undoing what a journal says gives the file before its last change. `header`: of the
-/// file.
+/// Whether a rollback with this journal gives the file as it was before its last commit. `header`:
+/// of the file.
 bool is_own_journal(std::istream& journal, const Database::Header& header) {
   std::array<unsigned char, 28> start{};
   constexpr std::array<unsigned char, 8> kMagic{0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7};
   if (!read(journal, start) || !std::equal(kMagic.begin(), kMagic.end(), start.begin())) {
-    return true;  // SQLite undoes nothing
+    return true;  // SQLite ignores it
   }
   const std::uint32_t records = big_endian(start, 8);
   const std::uint32_t pages = big_endian(start, 16);
@@ -208,7 +207,7 @@ std::string header_fault(const Database& database) {
   const Database::Header header = database.header();
   const int write = header[kWriteVersionAt];
   const int read = header[kReadVersionAt];
-  // Shorter files have none; SQLite refuses those that it cannot read.
+  // A shorter file has no header; SQLite refuses it.
   if (header[0] == 0 || (write == read && (read == kWithoutLog || read == kWithLog))) return "";
   return fmt::format(
       "the file: its header gives SQLite's write version as {} and its read version as {}; both "
@@ -217,7 +216,7 @@ std::string header_fault(const Database& database) {
 }
 
 void check_log(const Database& database) {
-  // A writer that begins or ends its log may look wrong for a moment.
+  // While a writer begins or ends its log, the two may disagree for a moment.
   constexpr int kAttempts = 5;
   constexpr std::chrono::milliseconds kPause{20};
   std::string fault;
@@ -264,7 +263,7 @@ bool close_log(const Database& database) {
   };
   database.execute("PRAGMA busy_timeout = 0");
   const bool is_closed = attempt("PRAGMA journal_mode = DELETE");
-  // Else a copy of the file alone has all that no reader is in the midst of.
+  // Otherwise the file alone gets all that no reader prevents.
   if (!is_closed) attempt("PRAGMA wal_checkpoint(FULL)");
   database.execute(fmt::format("PRAGMA busy_timeout = {}", timeout_ms));
   return is_closed;

@@ -21,8 +21,7 @@
 namespace loopbit {
 namespace {
 
-// How a map's values become bytes; docs/format.md describes the same. All numbers are
-// little-endian.
+// The encoding of values, as in docs/format.md. All numbers are little-endian.
 
 static_assert(std::endian::native == std::endian::little, "the file's numbers are little-endian");
 static_assert(sizeof(Keypoint) == 4 * sizeof(float));
@@ -58,7 +57,7 @@ void copy_out(unsigned char*& bytes, const T* values, std::size_t number) {
   bytes += number * sizeof(T);
 }
 
-/// CRC-32, as zlib computes it, of values in turn.
+/// zlib's CRC-32 of a sequence of values.
 class Checksum {
  public:
   Checksum& add(std::int64_t value);
@@ -91,19 +90,19 @@ Checksum& Checksum::add(double value) {
   return add(std::bit_cast<std::array<unsigned char, sizeof stored>>(stored));
 }
 
-/// 512 bytes: 64 rows of 64 bits. Valid as long as `content`.
+/// The 512 bytes of `content`, valid as long as it is: 64 rows of 64 bits.
 std::span<const unsigned char> content_bytes(const BinaryContent& content) {
   return {reinterpret_cast<const unsigned char*>(content.rows.data()), sizeof content.rows};
 }
 
-/// False, and `content` as it was, unless there are 512 bytes.
+/// False, and `content` unchanged, unless there are 512 bytes.
 bool read_content(std::span<const unsigned char> bytes, BinaryContent& content) {
   if (bytes.size() != sizeof content.rows) return false;
   std::memcpy(content.rows.data(), bytes.data(), bytes.size());
   return true;
 }
 
-/// 16 + 80 bytes a feature.
+/// 16 bytes, plus 80 bytes per feature.
 std::vector<unsigned char> features_bytes(const Features& features) {
   const std::size_t size = features.keypoints.size();
   const Header header{features.working_size_px.width, features.working_size_px.height,
@@ -117,7 +116,7 @@ std::vector<unsigned char> features_bytes(const Features& features) {
   return bytes;
 }
 
-/// Nothing unless the bytes are features within the limits that SurfOptions sets.
+/// None unless the bytes are features within the limits of SurfOptions.
 std::optional<Features> features_from(std::span<const unsigned char> bytes) {
   Header header{};
   if (bytes.size() < sizeof header) return std::nullopt;
@@ -144,9 +143,9 @@ std::optional<Features> features_from(std::span<const unsigned char> bytes) {
   return features;
 }
 
-/// Behind a page that cannot be read, so many keys are tried for the next one that can: ten in
-/// turn, then in steps that grow to 100, 51,000 keys in all. A damaged page of contents holds 29
-/// rows, one of the pages above it some 50,000.
+/// After an unreadable page, this many keys are tried to find the next readable one: ten in
+/// sequence, then in steps that grow to 100, over 51,000 keys in all. A leaf page of contents has
+/// 29 rows, and a page above it leads to about 50,000.
 constexpr std::int64_t kMaxProbes = 1000;
 constexpr std::int64_t kProbesPerStep = 10;
 
@@ -159,7 +158,7 @@ void for_each_row(const Database& database, const std::string& table, const std:
   Statement rows(database, fmt::format("SELECT {} FROM {} WHERE {} >= ?1 ORDER BY {}", columns,
                                        table, key, key));
   std::int64_t next = 1;
-  std::int64_t damaged_from = 0;  // 0: not in a damaged stretch
+  std::int64_t damaged_from = 0;  // 0: not in a damaged range
   for (std::int64_t probes = 0; probes < kMaxProbes;) {
     rows.reset();
     rows.bind(1, next);
@@ -211,7 +210,7 @@ Checksum checksum_of(const MapPlace& place) {
       .add(content_bytes(place.content));
 }
 
-/// Not in the order of features, so that these never pass for an image.
+/// The order differs from that of features, so that features never pass for an image.
 Checksum checksum_of_image(std::span<const unsigned char> jpeg, const SessionFrame& at) {
   return Checksum().add(jpeg).add(std::int64_t{at.session}).add(std::int64_t{at.frame});
 }
@@ -226,7 +225,7 @@ Checksum checksum_of(const MapLoop& loop) {
       .add(std::int64_t{loop.inliers});
 }
 
-/// What does not fit is no value of ours, and turns the checksum wrong.
+/// -1 for values that do not fit: we never write these, and the checksum will differ.
 int narrow(std::int64_t value) {
   return value >= 0 && value <= std::numeric_limits<int>::max() ? static_cast<int>(value) : -1;
 }
@@ -425,7 +424,7 @@ void RowWriter::write(const MapLoop& loop) {
   loop_.reset();
 }
 
-// The sequence alone would do, but for damage.
+// The sequence alone is enough unless the map is damaged.
 int next_session(const Database& database) {
   return narrow(
       1 + std::max(database.integer("SELECT max(session) FROM session"),

@@ -24,7 +24,7 @@ namespace {
 struct Table {
   const char* name;
   const char* definition;  ///< as SQLite keeps it
-  int since = 1;           ///< the version of maps that brought it
+  int since = 1;           ///< the first version of maps that has it
 };
 
 constexpr std::array kTables{
@@ -49,7 +49,7 @@ constexpr std::array kTables{
           "NOT NULL)",
           kFirstVersionWithImages}};
 
-/// SQLite makes it for AUTOINCREMENT.
+/// SQLite creates it for AUTOINCREMENT.
 constexpr Table kSequences{"sqlite_sequence", "CREATE TABLE sqlite_sequence(name,seq)"};
 
 Database::Remedies remedies(const std::string& path) {
@@ -61,7 +61,7 @@ Database::Remedies remedies(const std::string& path) {
                               path)};
 }
 
-/// Throws Error (kind input) if there is no file, or the system does not say.
+/// Throws Error (kind input) unless `path` is a file.
 void check_is_file(const std::string& path) {
   std::error_code error;
   const auto type = std::filesystem::status(path, error).type();
@@ -80,7 +80,7 @@ void check_is_file(const std::string& path) {
   throw Error(ErrorKind::input, fmt::format("'{}' {}.", database.path(), why));
 }
 
-/// A map has the tables of its version and no others: no view or trigger of a stranger is run.
+/// A map has exactly the tables of its version, so no foreign view or trigger is ever run.
 void check_tables(const Database& database, int version) {
   Statement rows(database, "SELECT name, sql FROM sqlite_schema");
   std::ptrdiff_t known = 0;
@@ -120,7 +120,7 @@ int checked_version(const Database& database) {
   return static_cast<int>(version);
 }
 
-/// Versions so far add tables; an empty file has version 0.
+/// Each version so far adds tables. An empty file has version 0.
 void migrate(const Database& database, int from, int to) {
   if (from >= to) return;
   for (const Table& table : kTables) {
@@ -130,7 +130,7 @@ void migrate(const Database& database, int from, int to) {
       fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kMapApplicationId, to));
 }
 
-/// Opens a file, made if there is none, with the right to write it.
+/// Opens or creates a file and locks it for writing.
 Database lock_map(const std::string& path) {
   while (true) {
     Database database(path, Database::Access::create, remedies(path));
@@ -144,7 +144,7 @@ Database lock_map(const std::string& path) {
   }
 }
 
-/// Throws Error (kind output) where a log would be missed or cannot be made.
+/// Throws Error (kind output) if a log would be overlooked or cannot be created.
 void check_may_be_written(const std::string& path) {
   if (const std::string reason = other_name(path); !reason.empty()) {
     throw Error(ErrorKind::output,
@@ -172,12 +172,12 @@ Database open_map_for_writing(const std::string& path, int version) {
   check_may_be_written(path);
   check_log(database);
   // Each commit is on disk when it returns (sqlite.org/wal.html, "Performance Considerations").
-  // With EXTRA that also holds for the mark of a log, which is committed before the log begins.
+  // With EXTRA that also holds for the first commit, before the log begins.
   database.execute(fmt::format("PRAGMA page_size = {}; PRAGMA synchronous = EXTRA", kMapPageBytes));
   const int found = checked_version(database);
   if (found > 0) check_tables(database, found);
   close_log(database);  // of a run that was killed
-  // Throws if nothing can be written, or if a long read would keep the log from beginning.
+  // Throws if nothing can be written, or if a long read would prevent the log.
   database.execute("BEGIN EXCLUSIVE; ROLLBACK");
   if (found == 0) {
     database.execute("BEGIN IMMEDIATE");

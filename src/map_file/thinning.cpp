@@ -51,16 +51,16 @@ class Thinning {
 
  private:
   struct Node {
-    std::size_t previous = kNone;  ///< of those kept, in the session
+    std::size_t previous = kNone;  ///< the previous kept place of the session
     std::size_t next = kNone;
-    std::size_t substitute = kNone;  ///< what stands for it
+    std::size_t substitute = kNone;  ///< the place that can represent it
     double cost = 0;
-    double owed = 0;  ///< the largest cost of those that it stands for
+    double owed = 0;  ///< the largest cost of the places that it represents
     std::vector<std::size_t> loops_to_it;
     bool removed = false;
   };
 
-  /// Finds who stands for a place, and at what cost.
+  /// Finds the place that can represent this one, and the cost of dropping it.
   void assess(std::size_t i) {
     Node& node = nodes_[i];
     if (node.removed) return;
