@@ -127,6 +127,7 @@ class CommandLineTest(CommandTest):
         os.close(leader)
         self.assertRegex(shown.decode(), r"\[#+\.*\] \d+ of 40 frames, [\d.]+ frames/s, "
                                          r"\d+:\d\d left, \d+ loops?")
+        self.assertTrue(shown.endswith(b"\r\x1b[K"), "the bar is left")
 
     def test_help_names_every_command_and_exit_code(self):
         text = loopbit("--help").stdout

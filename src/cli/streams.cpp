@@ -77,6 +77,11 @@ void tell(const std::string& text) {
   (void)std::fflush(kOwnStderr);
 }
 
+void clear_terminal_line() {
+  (void)std::fputs("\r\033[K", kOwnStderr);
+  (void)std::fflush(kOwnStderr);
+}
+
 void flush_stdout() {
   errno = 0;
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;

@@ -17,6 +17,9 @@ void keep_libraries_quiet();
 /// stderr itself are ignored.
 void tell(const std::string& text);
 
+/// Erases the current line of a terminal that is stderr.
+void clear_terminal_line();
+
 /// Throws Error (kind output) if something that was printed did not reach stdout.
 void flush_stdout();
 
