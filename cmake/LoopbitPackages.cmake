@@ -3,7 +3,7 @@ set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "The loopbit authors <authors@loopbit.invalid>")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL lib map data dev tools python)
+set(CPACK_COMPONENTS_ALL lib map images data dev tools python)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
@@ -28,23 +28,30 @@ set(CPACK_DEBIAN_MAP_PACKAGE_DEPENDS "libloopbit${abi} ${this}")
 set(CPACK_DEBIAN_MAP_DESCRIPTION "${summary}: maps
  Keeps what a detector has seen in an SQLite file that later runs continue.")
 
+set(CPACK_DEBIAN_IMAGES_PACKAGE_NAME libloopbit-images${abi})
+set(CPACK_DEBIAN_IMAGES_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_IMAGES_PACKAGE_DEPENDS "libloopbit${abi} ${this}")
+set(CPACK_DEBIAN_IMAGES_DESCRIPTION "${summary}: images
+ Reads images from files, folders, lists, videos and cameras.")
+
 set(CPACK_DEBIAN_DATA_PACKAGE_NAME libloopbit-data${abi})
 set(CPACK_DEBIAN_DATA_PACKAGE_SECTION libs)
-set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}")
+set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}")
 set(CPACK_DEBIAN_DATA_DESCRIPTION "${summary}: data sets, scores, reports
- Reads image sequences and ground truth, scores loops, and writes reports.")
+ Reads ground truth, scores loops, and writes reports.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libloopbit-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-data${abi} ${this}, libopencv-dev")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-data${abi} ${this}, libopencv-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "${summary}: headers
  For programs that use loopbit, with CMake or pkg-config.")
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME loopbit)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-data${abi} ${this}")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-data${abi} ${this}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "${summary}: the command
  Finds loops in image sequences, scores and shows them.")
 
@@ -53,7 +60,7 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 if(LOOPBIT_BUILD_PYTHON)
   math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
   string(CONCAT CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-         "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-data${abi} ${this}, python3-numpy, "
+         "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-data${abi} ${this}, python3-numpy, "
          "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_minor})")
 endif()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS python3-matplotlib)

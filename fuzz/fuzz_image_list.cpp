@@ -4,8 +4,7 @@
 #include "sequence_lists.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  loopbit::fuzz::read_as_file(data, size, ".csv", [](const std::string& path) {
-    (void)loopbit::datasets::list_file(path);
-  });
+  loopbit::fuzz::read_as_file(
+      data, size, ".csv", [](const std::string& path) { (void)loopbit::images::list_file(path); });
   return 0;
 }

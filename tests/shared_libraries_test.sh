@@ -30,8 +30,9 @@ link() {
 
 link loopbit
 link loopbit_map -lloopbit
-link loopbit_data -lloopbit_map -lloopbit
-link loopbit_report -lloopbit_data -lloopbit_map -lloopbit
+link loopbit_images -lloopbit
+link loopbit_data -lloopbit_images -lloopbit_map -lloopbit
+link loopbit_report -lloopbit_data -lloopbit_images -lloopbit_map -lloopbit
 
 grep -q '^loopbit::LoopDetector::process(' "$scratch/loopbit.symbols"
 # Of the private headers nothing.
