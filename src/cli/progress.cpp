@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "streams.hpp"
+#include "process.hpp"
 
 namespace loopbit::cli {
 namespace {
