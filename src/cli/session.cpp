@@ -145,7 +145,6 @@ int run_session(Session session, const SessionFlags& flags) {
                         .description = session.source->description(),
                         .options = options,
                         .every = session.every,
-                        .views = session.views,
                         .limit = session.limit,
                         .threads = threads,
                         .map_path = flags.map,
