@@ -294,6 +294,24 @@ Color HouseColumn::at(float z, float footprint) const {
                      footprint);
 }
 
+float HouseColumn::glow(float z, float footprint) const {
+  constexpr float kLit = 0.4F;  // share of windows
+  if (z > style_.eaves_m - 0.25F) return 0.0F;
+  const bool low = z < style_.ground_floor_m;
+  if (low && door_bay_) return 0.0F;
+  if (low && style_.shop) {
+    return across(-style_.bay_m * 0.44F, style_.bay_m * 0.44F) *
+           cover(z, 0.5F, kShopTop_m - 0.1F, footprint);
+  }
+  const float upper = low ? 0.0F : (z - style_.ground_floor_m) / style_.floor_m;
+  const int floor = low ? 0 : floor_int(upper) + 1;
+  if (floor >= style_.floors || unit(hash_of(detail_ + 31, bay_, floor)) >= kLit) return 0.0F;
+  const float y =
+      low ? z - kSill_m - 0.2F : (upper - static_cast<float>(floor - 1)) * style_.floor_m - kSill_m;
+  const float half = style_.window_width_m / 2 - kFrame_m;
+  return across(-half, half) * cover(y, kFrame_m, style_.window_height_m - kFrame_m, footprint);
+}
+
 HouseStyle make_house_style(std::uint32_t seed, double depth_m) {
   Random random(seed);
   HouseStyle style;

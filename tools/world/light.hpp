@@ -11,7 +11,7 @@
 
 namespace loopbit::town {
 
-/// Sun and sky of a lap.
+/// Sun, sky and lamps of a lap.
 struct Light {
   double azimuth_rad = 0.6;  // of the sun, from east to north
   double rise = 1.0;         // tangent of its elevation
@@ -21,12 +21,14 @@ struct Light {
   Color sky_top;
   Color sky_low;
   Color cloud;
+  Color lamp;  // of street lamps and lit windows; black by day
   float cloud_cover = 0.5F;
   float cloud_shift = 0.0F;
 };
 
-/// The light of `lap`, `change` (0 to 1) of the way from the first lap's to a light of its own.
-Light light_of_lap(std::uint32_t seed, int lap, double change);
+/// The light of `lap`, `change` (0 to 1) of the way from the first lap's to a light of its own, and
+/// then `night` (0 to 1) of the way to darkness.
+Light light_of_lap(std::uint32_t seed, int lap, double change, float night);
 
 /// The sky in the direction (x, y, rise), where (x, y) is a unit vector and rise a tangent >= 0.
 Color sky_color(const Light& light, Vec2 direction, float rise);

@@ -55,7 +55,12 @@ float tree(const Billboard& board, float x, float z, float footprint, Color& col
   const float dx = x / board.half_width_m;
   const float dz = (z - crown_low - half_high) / half_high;
   const float inside = 1.0F - std::sqrt(dx * dx + dz * dz) + 0.45F * clumps;
-  const float crown = clamp01(inside * 6.0F / std::max(1.0F, 20.0F * footprint));
+  float crown = clamp01(inside * 6.0F / std::max(1.0F, 20.0F * footprint));
+  if (board.bare > 0) {
+    const float twigs =
+        unit(scramble(board.detail + 3)) + noise_of_size(board.detail + 4, x, z, 0.12F, footprint);
+    crown *= clamp01(1.0F - 1.6F * board.bare + 0.6F * twigs * board.bare);
+  }
   const float leaves =
       0.7F * noise_of_size(board.detail + 2, x, z, 0.13F, footprint) + 0.9F * clumps + 0.25F * dz;
   const float season = unit(scramble(board.detail));
@@ -192,6 +197,12 @@ Color roof_color(const HouseStyle& style, float u, float v, float footprint) {
   const float step = cover(wrap(v, kTile_m), 0.0F, 0.07F, footprint);
   const float moss = 0.3F * noise_of_size(style.seed + 22, u, v, 1.2F, footprint);
   return style.roof * (1.0F + fade * (0.35F * own - 0.4F * step) + moss);
+}
+
+Color in_snow(Color color, std::uint32_t seed, float x, float y, float season) {
+  const float patch = value_noise(seed, x / 1.7F, y / 1.7F) + 0.5F;
+  const Color wet = color * (1.0F - 0.35F * season);
+  return blend(wet, gray(0.85F), 0.9F * clamp01((season - patch) * 4.0F));
 }
 
 float glyphs(std::uint32_t seed, float x, float y, float height_m, float footprint) {

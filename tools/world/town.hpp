@@ -37,6 +37,9 @@ struct Lot {
 /// The style of a house with this `seed` and depth.
 HouseStyle make_house_style(std::uint32_t seed, double depth_m);
 
+/// Changes the season of all objects by `share`, 0 to 1: leaves fall, and houses are painted anew.
+void change_season(Scene& scene, float share);
+
 /// The town: streets on a square grid everywhere, blocks with houses around their edges between
 /// them. Nothing is stored: a block's houses follow from the block's position and the seed.
 class Town {

@@ -29,6 +29,8 @@ struct WorldOptions {
   double spacing_m = 0.9;
   double lateral_offset_m = 1.0;
   double light_change = 0.6;
+  double night = 0.0;
+  double season = 0.0;
   double moving_objects = 0.5;
   double look_alike = 0.3;
   double blank_stretch = 0.12;
@@ -53,6 +55,12 @@ struct WorldOptions {
               "Offset of the later laps to the left of the first one, m"},
         Field{"light_change", &W::light_change, 0.0, 1.0,
               "Change of sun, sky and colours from lap to lap (0 = none)"},
+        Field{
+            "night", &W::night, 0.0, 1.0,
+            "Darkness from the second lap on: no sun, lamps, lit windows, noise, grey (0 = none)"},
+        Field{
+            "season", &W::season, 0.0, 1.0,
+            "Change of season from the second lap on: bare trees, snow, painted houses (0 = none)"},
         Field{"moving_objects", &W::moving_objects, 0.0, 1.0,
               "Amount of traffic; every lap has other cars and people (0 = none)"},
         Field{"look_alike", &W::look_alike, 0.0, 1.0,
