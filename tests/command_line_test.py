@@ -444,8 +444,7 @@ class CommandLineTest(CommandTest):
             for code, command in ((3, ["eval", name, *truth]), (3, ["eval", f"a={name}", *truth]),
                                   (3, ["report", name]), (3, ["run", name, "--out", self.out]),
                                   (4, ["run", self.images, "--out", name]),
-                                  (4, ["report", self.reference, "--out", name]),
-                                  (3, ["reproduce", name, "--out", self.out])):
+                                  (4, ["report", self.reference, "--out", name])):
                 with self.subTest(command=command):
                     self.assert_fails(loopbit(*command), code, name)
 

@@ -31,7 +31,6 @@ void add_map(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_report(CLI::App& app);
-void add_reproduce(CLI::App& app, const Arguments& arguments, int& exit_code);
 void add_options(CLI::App& app);
 
 /// "NAME=VALUE" in two. Throws Error (kind option) without a "=".
