@@ -17,7 +17,7 @@
 #include "loopbit/version.hpp"
 
 #include "commands.hpp"
-#include "streams.hpp"
+#include "process.hpp"
 
 namespace {
 

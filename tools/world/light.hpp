@@ -3,9 +3,11 @@
 #pragma once
 
 #include <cstdint>
+#include <vector>
 
 #include "color.hpp"
 #include "scene.hpp"
+#include "town.hpp"
 
 namespace loopbit::town {
 
@@ -28,5 +30,28 @@ Light light_of_lap(std::uint32_t seed, int lap, double change);
 
 /// The sky in the direction (x, y, rise), where (x, y) is a unit vector and rise a tangent >= 0.
 Color sky_color(const Light& light, Vec2 direction, float rise);
+
+/// The shadows of houses. Remembers the heights it has looked up; not thread-safe.
+class Shadows {
+ public:
+  /// `town` must outlive the shadows.
+  Shadows(const Town& town, const Light& light);
+
+  /// The height below which `point`, in a street, is in the shade, in metres; may be below 0.
+  [[nodiscard]] float height_at(Vec2 point);
+
+ private:
+  struct Memory {
+    LotKey key;
+    float top_m = -1.0F;
+  };
+  [[nodiscard]] float top_m(const LotKey& key);
+
+  const Town& town_;
+  Vec2 to_sun_;
+  double rise_;
+  std::vector<Memory> memory_;
+  Memory last_;
+};
 
 }  // namespace loopbit::town

@@ -8,7 +8,6 @@
 #include "light.hpp"
 #include "surfaces.hpp"
 #include "town.hpp"
-#include "town_memory.hpp"
 
 namespace loopbit::town {
 

@@ -75,6 +75,10 @@ Light between(const Light& a, const Light& b, double share) {
   return mixed;
 }
 
+std::size_t slot_of(const LotKey& key) {
+  return hash_of(hash_of(0, key.block.x, key.block.y), key.side, key.number) % kMemorySlots;
+}
+
 }  // namespace
 
 Light light_of_lap(std::uint32_t seed, int lap, double change) {
@@ -95,6 +99,23 @@ Color sky_color(const Light& light, Vec2 direction, float rise) {
   const float cover = clamp01((thickness + light.cloud_cover - 0.5F) * 2.5F + 0.5F);
   const float haze = clamp01(rise * 5.0F);
   return blend(clear, light.cloud * (1.0F - 0.15F * cover * thickness), cover * haze);
+}
+
+Shadows::Shadows(const Town& town, const Light& light)
+    : town_(town), to_sun_(light.to_sun), rise_(light.rise), memory_(kMemorySlots) {}
+
+float Shadows::top_m(const LotKey& key) {
+  if (last_.top_m >= 0 && last_.key == key) return last_.top_m;
+  Memory& memory = memory_[slot_of(key)];
+  if (memory.top_m < 0 || !(memory.key == key)) memory = {key, town_.top_m(key)};
+  last_ = memory;
+  return memory.top_m;
+}
+
+float Shadows::height_at(Vec2 point) {
+  double distance_m = 0.0;
+  const LotKey key = town_.first_lot(point, to_sun_, distance_m);
+  return top_m(key) - static_cast<float>(distance_m * rise_);
 }
 
 }  // namespace loopbit::town

@@ -22,6 +22,7 @@ constexpr double kFarthestLot_m = 1000.0;
 constexpr double kFurnitureLine_m = 6.0;
 constexpr double kFurnitureSlot_m = 7.0;
 constexpr int kSlotsPerLamp = 3;
+constexpr double kSquare_m = 4.0;  // of bare or other ground
 
 // Salts give different things at one place different hashes.
 constexpr std::uint32_t kLotSalt = 0x10701U;
@@ -233,6 +234,19 @@ void Town::add_surroundings(Vec2 eye, Scene& scene) const {
       add_street({x, y}, {0, 1}, eye, scene);
     }
   }
+}
+
+BareGround::BareGround(const Town& town) : town_(town), memory_(kMemorySlots) {}
+
+bool BareGround::at(Vec2 point) {
+  const GridPoint square{floor_int(point.x / kSquare_m), floor_int(point.y / kSquare_m)};
+  const std::uint32_t slot = hash_of(0, square.x, square.y) % kMemorySlots;
+  Memory& memory = memory_[slot];
+  if (!memory.known || !(memory.square == square)) {
+    const Vec2 middle{(square.x + 0.5) * kSquare_m, (square.y + 0.5) * kSquare_m};
+    memory = {square, true, town_.bare_ground(middle)};
+  }
+  return memory.bare;
 }
 
 }  // namespace loopbit::town

@@ -225,46 +225,4 @@ std::size_t World::storage_bytes() const noexcept {
   return sizeof(Plan) + plan_->circuit.storage_bytes();
 }
 
-namespace {
-
-class WorldSource final : public ImageSource {
- public:
-  explicit WorldSource(std::shared_ptr<const World> world) : world_(std::move(world)) {}
-
-  bool next(Frame& frame) override {
-    if (at_end()) return false;
-    frame = {fmt::format("{:06}", frame_), World::time_s(frame_), world_->render(frame_), {}};
-    ++frame_;
-    return true;
-  }
-
-  bool skip() override {
-    if (at_end()) return false;
-    ++frame_;
-    return true;
-  }
-
-  [[nodiscard]] std::optional<std::size_t> size() const override {
-    return static_cast<std::size_t>(world_->options().frames);
-  }
-
-  [[nodiscard]] std::string description() const override {
-    const WorldOptions& options = world_->options();
-    return fmt::format("built-in world, seed {}, {} frames, {} laps of {:.0f} m", options.seed,
-                       options.frames, options.laps, world_->circuit_m());
-  }
-
- private:
-  [[nodiscard]] bool at_end() const { return frame_ >= world_->options().frames; }
-
-  std::shared_ptr<const World> world_;
-  int frame_ = 0;
-};
-
-}  // namespace
-
-std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world) {
-  return std::make_unique<WorldSource>(std::move(world));
-}
-
 }  // namespace loopbit

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "circuit.hpp"
 #include "scene.hpp"
@@ -81,6 +83,28 @@ class Town {
   double depth_m_;
   Row full_row_;   // along the south and the north of a block
   Row short_row_;  // between them
+};
+
+/// Slots of a cache for the pixels of one frame.
+constexpr std::size_t kMemorySlots = 512;
+
+/// Where the ground is bare, in squares of a few metres. Remembers them; not thread-safe.
+class BareGround {
+ public:
+  /// `town` must outlive this.
+  explicit BareGround(const Town& town);
+
+  [[nodiscard]] bool at(Vec2 point);
+
+ private:
+  struct Memory {
+    GridPoint square;
+    bool known = false;
+    bool bare = false;
+  };
+
+  const Town& town_;
+  std::vector<Memory> memory_;
 };
 
 }  // namespace loopbit::town

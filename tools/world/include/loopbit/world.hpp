@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -127,5 +129,13 @@ class World {
 
 /// The drive as a sequence of images, 10 frames per second.
 std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world);
+
+/// Writes the whole drive as a data set: images/000000.png ..., times.txt (seconds), poses.txt
+/// (KITTI: camera to world, 3 x 4 numbers per row, x right, y down, z forward), truth.csv and
+/// not_false.csv. Calls `on_frame(n)` after each image. Throws Error (kind output) if `folder`
+/// already contains images or cannot be written.
+void write_dataset(
+    const World& world, const std::string& folder,
+    const std::function<void(int)>& on_frame = [](int) {});
 
 }  // namespace loopbit
