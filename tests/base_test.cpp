@@ -18,6 +18,7 @@ using namespace std::string_view_literals;
 
 TEST(Printable, ControlCharactersAreWrittenOut) {
   EXPECT_EQ(printable("a\x1B[31mb\rc\td\x7F"), R"(a\x1b[31mb\x0dc\x09d\x7f)");
+  EXPECT_EQ(printable("two\nlines"), R"(two\x0alines)");
   EXPECT_EQ(printable("a\0b"sv), R"(a\x00b)");
   EXPECT_EQ(printable("\xC2\x9B"
                       "31m"),
@@ -30,12 +31,16 @@ TEST(Printable, ControlCharactersAreWrittenOut) {
 }
 
 TEST(Printable, TextStaysAsItIs) {
-  for (const std::string_view text : {"two\nlines",
-                                      "Stra\xC3\x9F"
+  for (const std::string_view text : {"Stra\xC3\x9F"
                                       "e \xE2\x82\xAC \xF0\x9F\x9A\x97",
                                       "Gr\xFC\xDF", "\xC2\xA0", ""}) {
     EXPECT_EQ(printable(text), text);
   }
+}
+
+TEST(Printable, JsonKeepsItsMeaning) {
+  EXPECT_EQ(printable_json("{\n  \"a\\u001b\": \"\x7F\xC2\x9B\xC3\x9F\"\n}"),
+            "{\n  \"a\\u001b\": \"\\u007f\\u009b\xC3\x9F\"\n}");
 }
 
 class ReadFile : public test::ScratchTest {};

@@ -127,6 +127,7 @@ class CommandLineTest(CommandTest):
         os.close(leader)
         self.assertRegex(shown.decode(), r"\[#+\.*\] \d+ of 40 frames, [\d.]+ frames/s, "
                                          r"\d+:\d\d left, \d+ loops?")
+        self.assertTrue(shown.endswith(b"\r\x1b[K"), "the bar is left")
 
     def test_help_names_every_command_and_exit_code(self):
         text = loopbit("--help").stdout
@@ -428,10 +429,10 @@ class CommandLineTest(CommandTest):
 
     def test_names_do_not_steer_the_terminal(self):
         folder = self.few_images(3)
-        (folder / "z\x1b[31m\r\x9b.png").write_text("no image")
+        (folder / "z\x1b[31m\r\n\x9b.png").write_text("no image")
         ran = loopbit("run", folder, "--out", self.scratch / "out\x1b[2J")
         self.assertEqual(ran.returncode, 0, ran.stderr)
-        self.assertIn("z\\x1b[31m\\x0d\\xc2\\x9b.png", ran.stderr)
+        self.assertIn("z\\x1b[31m\\x0d\\x0a\\xc2\\x9b.png", ran.stderr)
         self.assertIn("out\\x1b[2J", ran.stdout)
         missing = loopbit("eval", "no\x1b[2J", "--truth", "no\x1b[2J")
         self.assert_fails(missing, 3, "no\\x1b[2J")

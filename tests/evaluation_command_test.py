@@ -380,27 +380,6 @@ class EvaluationCommandTest(CommandTest):
         (folder / "run.json").write_text('{"score"')
         self.assert_fails(loopbit("eval", folder), 3, folder, "run.json")
 
-    def test_a_record_may_say_that_truth_counts_two_images_as_one_frame(self):
-        both = self.scratch / "both.mat"
-        write_mat(both, "truth", 24, [(9, 3), (10, 3), (22, 1)])
-        left = self.scratch / "left.mat"
-        write_mat(left, "truth", 12, [(4, 1), (5, 1), (11, 0)])
-        images = self.few_images(24)
-        run, plain = self.scratch / "run", self.scratch / "plain"
-        for folder in (run, plain):
-            ran = loopbit("run", images, "--every", 2, "--out", folder, "--no-report", "--truth",
-                          both, "--truth-views", 2)
-            self.assertEqual(ran.returncode, 0, ran.stderr)
-        record = json.loads((run / "run.json").read_text())
-        record["input"]["views"] = 2
-        (run / "run.json").write_text(json.dumps(record))
-        self.assertEqual(self.score(run, "--truth", left)["positives"], 3)
-        self.assertEqual(self.score(run, "--truth", both, "--truth-views", 2)["positives"], 3)
-        for runs in ((run, plain), (plain, run)):
-            compared = loopbit("compare", *runs, "--truth", left, "--json")
-            self.assertEqual(compared.returncode, 0, compared.stderr)
-            self.assertEqual([row["positives"] for row in json.loads(compared.stdout)], [3, 3])
-
     # Real results of others.
 
     def test_published_loops_of_ibow_lcd(self):

@@ -11,9 +11,11 @@ import re
 import shutil
 import signal
 import sqlite3
+import struct
 import subprocess
 import time
 import unittest
+import zlib
 
 from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, loopbit, rows
 
@@ -49,6 +51,29 @@ class MapCommandTest(CommandTest):
         self.assertEqual(record["map"], {"path": str(self.map), "session": 2})
         self.assertFalse(list(self.made.glob("town.db-*")), "the log is left")
         self.assertFalse(list(self.made.glob("*.lock")))
+
+    def test_checksums_are_those_of_zlib_as_the_docs_describe(self):
+        town = self.scratch / "town.db"
+        made = loopbit("run", self.laps[0], "--map", town, "--keep-images", "--no-report")
+        self.assertEqual(made.returncode, 0, made.stderr)
+        queries = {
+            "session": "SELECT session, frames, uid, name, started, loopbit, options, checksum "
+                       "FROM session",
+            "place": "SELECT session, frame, ifnull(timestamp, 0.0), content, checksum FROM place",
+            "features": "SELECT session, frame, features, f.checksum FROM features AS f "
+                        "JOIN place USING (place)",
+            "image": "SELECT image, session, frame, i.checksum FROM image AS i "
+                     "JOIN place USING (place)",
+            "loop": "SELECT session, frame, match_session, match_frame, score, similarity, "
+                    "matches, inliers, checksum FROM loop"}
+        encoders = {int: lambda value: struct.pack("<q", value), str: str.encode,
+                    float: lambda value: struct.pack("<d", value), bytes: bytes}
+        for path, table in [*((town, table) for table in queries), (self.map, "loop")]:
+            checked = sqlite3.connect(path).execute(queries[table]).fetchall()
+            for *values, checksum in checked:
+                data = b"".join(encoders[type(value)](value) for value in values)
+                self.assertEqual(zlib.crc32(data), checksum, table)
+            self.assertTrue(checked or table == "loop", table)
 
     @unittest.skipIf(QUICK, "too few frames")
     def test_the_second_lap_is_recognised_as_session_and_frame(self):

@@ -203,6 +203,13 @@ TEST_F(MapDamage, AFullDiskIsToldAndCostsNothingSaved) {
   add_session(path("map.db"), 3, "fourth");
 }
 
+TEST_F(MapDamage, ARecoveryReplacesNoLink) {
+  fs::create_symlink("nowhere", path("link.db"));
+  expect_error(ErrorKind::output, {"link.db' exists"},
+               [&] { recover_map(path("map.db"), path("link.db")); });
+  EXPECT_TRUE(fs::is_symlink(path("link.db")));
+}
+
 TEST_F(MapDamage, ARecoveryThatFindsNoSpaceLeavesNothing) {
   {
     const FullDisk disk(fs::file_size(path("map.db")) / 2);

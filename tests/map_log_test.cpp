@@ -22,6 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::size_t kPageBytes = 16384;
+
 /// Does `work` in a process of its own, which ends with _exit(0): as if it were killed.
 void killed_after(const std::function<void()>& work) {
   const pid_t child = fork();
@@ -56,7 +58,7 @@ class MapLog : public ScratchTest {
   /// All that opens `map` is refused, and changes nothing.
   void expect_refused(const std::string& map, const std::string& words) {
     const std::string before = read_bytes(map);
-    const std::string log = read_bytes(map + "-wal");
+    const std::string log = read_bytes(map + "-wal") + read_bytes(map + "-journal");
     expect_error(ErrorKind::input, {map, words}, [&] { const MapReader reader(map); });
     expect_error(ErrorKind::input, {map, words}, [&] { check_map(map); });
     expect_error(ErrorKind::input, {map, words}, [&] { recover_map(map, path("new.db")); });
@@ -64,7 +66,7 @@ class MapLog : public ScratchTest {
     expect_error(ErrorKind::input, {map, words}, [&] { merge_map(path("into.db"), map); });
     EXPECT_ANY_THROW(MapWriter(map, fast_options(), "drive"));
     EXPECT_EQ(read_bytes(map), before);
-    EXPECT_EQ(read_bytes(map + "-wal"), log);
+    EXPECT_EQ(read_bytes(map + "-wal") + read_bytes(map + "-journal"), log);
   }
 
   std::string a_;
@@ -198,6 +200,81 @@ TEST_F(MapLog, ARefusedRunChangesNoByte) {
   });
   EXPECT_EQ(read_bytes(a_), before);
   EXPECT_TRUE(is_one_file(a_));
+}
+
+TEST_F(MapLog, ARunRefusedAtItsFirstCommitChangesNoByte) {
+  for (const std::string& map : {a_, b_}) {
+    add_session(map, 6);
+    if (map == b_) change(map, "DROP TABLE image; PRAGMA user_version = 1");
+    // Features are not read before places are compared, but written with the first frame.
+    const auto page = Database(map, Database::Access::create, {})
+                          .integer("SELECT rootpage FROM sqlite_schema WHERE name = 'features'");
+    std::string bytes = read_bytes(map);
+    bytes[static_cast<std::size_t>(page - 1) * kPageBytes] = '\xff';
+    (void)write(fs::path(map).filename().string(), bytes);
+    expect_error(ErrorKind::input, {map, "malformed"}, [&] { add_session(map, 3); });
+    EXPECT_EQ(read_bytes(map), bytes);
+    EXPECT_TRUE(is_one_file(map));
+    EXPECT_FALSE(fs::exists(map + "-journal"));
+  }
+}
+
+/// What SQLite leaves where it is killed in the midst of a commit without a log.
+void leave_journal(const std::string& path) {
+  killed_after([&] {
+    const Database database(path, Database::Access::create, {});
+    database.execute(
+        "PRAGMA cache_size = 1; BEGIN IMMEDIATE; PRAGMA user_version = 2; UPDATE place SET session "
+        "= 7, content = zeroblob(40000); UPDATE features SET features = zeroblob(40000)");
+    _exit(0);
+  });
+  ASSERT_GT(fs::file_size(path + "-journal"), kPageBytes);
+}
+
+TEST_F(MapLog, AJournalOfItsOwnIsUndone) {
+  add_session(a_, 3);
+  leave_journal(a_);
+  EXPECT_EQ(check_map(a_).places, 3);
+  EXPECT_TRUE(check_map(a_).damage.empty());
+}
+
+TEST_F(MapLog, AJournalOfItsOwnIsUndoneAfterAllPagesWereWritten) {
+  add_session(a_, 3);
+  const std::string before = read_bytes(a_);
+  std::string journal;
+  {
+    const Database database(a_, Database::Access::create, {});
+    const auto mark = database.integer("PRAGMA schema_version");
+    database.execute(
+        "PRAGMA journal_mode = PERSIST; BEGIN IMMEDIATE; PRAGMA user_version = 2; UPDATE place SET "
+        "session = 7");
+    database.set_schema_version(static_cast<std::int32_t>(5 << 16 | mark >> 16));
+    journal = read_bytes(a_ + "-journal").substr(0, 28);  // a commit erases these bytes
+    database.execute("COMMIT");
+    journal += read_bytes(a_ + "-journal").substr(28);
+  }
+  // As SQLite begins one that holds as many pages as it is long.
+  journal.replace(0, 12, "\xd9\xd5\x05\xf9\x20\xa1\x63\xd7\xff\xff\xff\xff");
+  ASSERT_FALSE(read_bytes(a_) == before);
+  (void)write("a.db-journal", journal);
+  EXPECT_EQ(check_map(a_).places, 3);
+  EXPECT_TRUE(read_bytes(a_) == before);
+}
+
+TEST_F(MapLog, AJournalOfAnotherMapIsRefused) {
+  add_session(a_, 3);
+  add_session(b_, 5);
+  fs::copy_file(b_, path("c.db"));
+  leave_journal(b_);
+  for (const std::string& map : {a_, path("made.db")}) {
+    (void)write("made.db", "");
+    fs::copy_file(b_ + "-journal", map + "-journal");
+    expect_refused(map, map + "-journal' is the journal of another map");
+  }
+  // Of another copy, which has gone on since.
+  add_session(path("c.db"), 1);
+  fs::copy_file(b_ + "-journal", path("c.db-journal"));
+  expect_refused(path("c.db"), "of another copy of");
 }
 
 TEST_F(MapLog, ARunWithoutFramesChangesNoByte) {

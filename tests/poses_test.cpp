@@ -177,6 +177,13 @@ TEST(TruthFromPoses, AStandingCameraIsOneRunAQuery) {
   EXPECT_EQ(truth_from_poses(two_places).same_place.size(), still.same_place.size());
 }
 
+TEST(TruthFromPoses, RefusesACameraThatIsElsewhereInEveryFrame) {
+  Poses poses;  // half of all pairs of frames show one place, and each pair is a run
+  for (int i = 0; i < 100'000; ++i) poses.emplace_back(pose_at(100 * (i % 2), 0));
+  test::expect_error(ErrorKind::input, {"of 100000", "back and forth", "fewer frames"},
+                     [&] { (void)truth_from_poses(poses); });
+}
+
 TEST(TruthFromPoses, ScalesWithPlacesFarFromTheOrigin) {
   Poses poses;
   for (const double x : {1e9 - 7, -1e9, 1e9 - 2, -1e9 + 4, 1e9 - 7}) {

@@ -253,12 +253,15 @@ TEST_F(RunFolderTest, ARunThatEndedIsKeptThoughAnOlderOneIsStillThere) {
 }
 
 TEST_F(RunFolderTest, ARunThatACrashLeftHalfMovedIsMovedWhole) {
-  write_run(path("run"), 3);
-  fs::create_directory(path("run/earlier_run.part"));
-  fs::rename(path("run/run.json"), path("run/earlier_run.part/run.json"));
-  write_run(path("run"), 0, kRunning);
-  EXPECT_EQ(frames_in(path("run")), 3U);
-  EXPECT_TRUE(fs::exists(path("run/run.json")));
+  for (const bool is_empty_folder_left : {false, true}) {  // of a run before that was removed
+    write_run(path("run"), 3);
+    if (is_empty_folder_left) fs::create_directory(path("run/earlier_run"));
+    fs::create_directory(path("run/earlier_run.part"));
+    fs::rename(path("run/run.json"), path("run/earlier_run.part/run.json"));
+    write_run(path("run"), 0, kRunning);
+    EXPECT_EQ(frames_in(path("run")), 3U);
+    EXPECT_TRUE(fs::exists(path("run/run.json")));
+  }
   fs::create_directory(path("run/earlier_run.part"));
   for (const char* name : {"loops.csv", "run.json"}) {
     fs::rename(path("run/") + name, path("run/earlier_run.part/") + name);

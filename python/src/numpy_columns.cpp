@@ -22,9 +22,11 @@ using Values = py::array_t<Value, py::array::c_style | py::array::forcecast>;
 /// `argument` as an array whose dtype is one of numpy's `kinds`; errors call them `words`.
 py::array array_of(const ArrayLike& argument, const char* name, std::string_view kinds,
                    const char* words) {
-  py::array array = py::module_::import("numpy").attr("asarray")(argument);
-  // An empty list has no element type.
-  if (array.size() > 0 && kinds.find(array.dtype().kind()) == std::string_view::npos) {
+  const auto numpy = py::module_::import("numpy");
+  py::array array = numpy.attr("asarray")(argument);
+  // Of an empty list, the element type says nothing.
+  if (array.size() == 0) return numpy.attr("empty")(array.attr("shape"), "i8");
+  if (kinds.find(array.dtype().kind()) == std::string_view::npos) {
     throw py::type_error(fmt::format("{} has dtype {}, but must be {}.", name,
                                      std::string(py::str(array.dtype())), words));
   }

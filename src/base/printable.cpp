@@ -27,23 +27,42 @@ bool is_control(std::string_view character) {
   return character.size() == 1 && (lead < 0x20 || (lead >= 0x7F && lead < 0xA0));
 }
 
-}  // namespace
-
-std::string printable(std::string_view text) {
+/// `text` with escape(result, character) in place of each control character.
+template <typename Escape>
+std::string escaped(std::string_view text, const Escape& escape) {
   std::string shown;
   shown.reserve(text.size());
   while (!text.empty()) {
     const std::string_view character = text.substr(0, character_bytes(text));
     text.remove_prefix(character.size());
-    if (character == "\n" || !is_control(character)) {
+    if (is_control(character)) {
+      escape(shown, character);
+    } else {
       shown += character;
-      continue;
-    }
-    for (const char c : character) {
-      fmt::format_to(std::back_inserter(shown), "\\x{:02x}", static_cast<unsigned char>(c));
     }
   }
   return shown;
+}
+
+}  // namespace
+
+std::string printable(std::string_view text) {
+  return escaped(text, [](std::string& shown, std::string_view control) {
+    for (const char c : control) {
+      fmt::format_to(std::back_inserter(shown), "\\x{:02x}", static_cast<unsigned char>(c));
+    }
+  });
+}
+
+std::string printable_json(std::string_view json) {
+  return escaped(json, [](std::string& shown, std::string_view control) {
+    const auto code = static_cast<unsigned char>(control.back());  // C1 is 0xC2 and its code
+    if (code < 0x20) {
+      shown += control;  // between values: JSON itself escapes these within them
+    } else {
+      fmt::format_to(std::back_inserter(shown), "\\u{:04x}", code);
+    }
+  });
 }
 
 }  // namespace loopbit

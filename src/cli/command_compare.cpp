@@ -142,7 +142,9 @@ void print_json(const std::vector<Row>& rows) {
     if (row.time) entry["time_ms"] = {{"mean", row.time->mean}, {"p99", row.time->p99}};
     json.push_back(entry);
   }
-  fmt::print("{}\n", json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  const std::string text =
+      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  fmt::print("{}\n", printable_json(text));
 }
 
 void compare_command(const CompareFlags& flags) {

@@ -23,7 +23,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string dump(const Json& json) {
-  return json.dump(2, ' ', false, Json::error_handler_t::replace);
+  return printable_json(json.dump(2, ' ', false, Json::error_handler_t::replace));
 }
 
 /// Of each session, how many places, or loops with a query in it, there are.
@@ -114,7 +114,7 @@ void list_command(const std::string& path, bool json) {
 void merge_command(const std::string& into, const std::vector<std::string>& others) {
   for (const std::string& other : others) {
     const MergeCounts counts = merge_map(into, other);
-    fmt::print("merged     {}: {} sessions, {} places, {} loops", other, counts.sessions,
+    fmt::print("merged     {}: {} sessions, {} places, {} loops", printable(other), counts.sessions,
                counts.places, counts.loops);
     if (counts.known > 0) fmt::print("; {} sessions were already there", counts.known);
     fmt::print("\n");
@@ -135,7 +135,7 @@ void export_command(const std::string& path, ExportFormat format, const std::str
 void images_command(const std::string& path, const std::string& folder) {
   MapReader map(path);
   PlaceImages images(map, folder);
-  fmt::print("images     {} in {}\n", images.write_all(), folder);
+  fmt::print("images     {} in {}\n", images.write_all(), printable(folder));
   warn_of_damage(map);
 }
 

@@ -74,7 +74,7 @@ void print_row(const std::string& image, std::string_view status, const ShownPla
   const RankedPlace& place = shown.ranked;
   fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7.1f}  {:>10.3f}  {:>7}{}{}\n", image, status,
              place.place.session, place.place.frame, place.score, place.similarity, place.inliers,
-             shown.image.empty() ? "" : "  ", shown.image);
+             shown.image.empty() ? "" : "  ", printable(shown.image));
 }
 
 void print_rows(const std::string& name, Status status, const std::vector<ShownPlace>& places) {
@@ -98,7 +98,9 @@ void print_line(const std::string& image, Status status, const std::vector<Shown
                               {"inliers", place.inliers}});
     if (!file.empty()) json["places"].back()["image"] = file;
   }
-  fmt::print("{}\n", json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  const std::string text =
+      json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  fmt::print("{}\n", printable_json(text));
 }
 
 /// Asks a map about images, and prints its answers.

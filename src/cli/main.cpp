@@ -78,8 +78,9 @@ int run_command_line(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     std::ostringstream told;
+    std::string line;
     const int code = app.exit(error, std::cout, told);
-    cli::tell(told.str());
+    for (std::istringstream lines(told.str()); std::getline(lines, line);) cli::tell(line + '\n');
     return code == 0 ? cli::success : cli::bad_option;
   }
   return exit_code;

@@ -82,7 +82,14 @@ void keep_closed_streams_closed() {
 }
 
 void tell(const std::string& text) {
-  (void)std::fputs(printable(text).c_str(), kOwnStderr);
+  const bool ends_line = text.ends_with('\n');
+  const auto line = std::string_view(text).substr(0, text.size() - (ends_line ? 1 : 0));
+  (void)std::fputs((printable(line) + (ends_line ? "\n" : "")).c_str(), kOwnStderr);
+  (void)std::fflush(kOwnStderr);
+}
+
+void clear_terminal_line() {
+  (void)std::fputs("\r\033[K", kOwnStderr);
   (void)std::fflush(kOwnStderr);
 }
 

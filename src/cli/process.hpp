@@ -14,8 +14,12 @@ void keep_closed_streams_closed();
 /// process aborts, the last of it is shown. loopbit reports damage in its own words, by tell().
 void keep_libraries_quiet();
 
-/// Writes `text`, printable(), to stderr. Errors of stderr itself are ignored.
+/// Writes one line, printable(), to stderr; it ends where `text` ends with a line feed. Errors of
+/// stderr itself are ignored.
 void tell(const std::string& text);
+
+/// Erases the current line of a terminal that is stderr.
+void clear_terminal_line();
 
 /// Throws Error (kind output) if something that was printed did not reach stdout.
 void flush_stdout();

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -77,9 +76,7 @@ std::string Progress::bar() const {
 }
 
 void Progress::clear_line() const {
-  if (!on_terminal_) return;
-  (void)std::fputs("\r\033[K", stderr);
-  (void)std::fflush(stderr);
+  if (on_terminal_) clear_terminal_line();
 }
 
 }  // namespace loopbit::cli

@@ -23,6 +23,9 @@ using Poses = std::vector<std::optional<CameraPose>>;
 /// Beyond, whole cells could no longer be told apart at the smallest radius.
 constexpr double kMaxCoordinate_m = 1e9;
 
+/// 60 MB. A drive has a few for each frame.
+constexpr std::size_t kMaxRuns = 5'000'000;
+
 /// How far the camera has come at each frame; it stays where it was while its pose is not known.
 std::vector<double> path_lengths_m(const Poses& poses) {
   std::vector<double> lengths_m;
@@ -125,6 +128,12 @@ class PoseTruth {
         begin = end;
       }
     }
+    if (runs.size() <= kMaxRuns) return;
+    throw Error(ErrorKind::input,
+                fmt::format("Up to frame {0} of {1}, the poses give more than {2} ranges of true "
+                            "places, since the camera goes back and forth between places all the "
+                            "time. Give the poses of fewer frames.",
+                            known_[query], path_m_.size(), kMaxRuns));
   }
 
   const PoseTruthOptions& options_;

@@ -23,11 +23,7 @@ std::string excerpt(std::string_view text) {
   constexpr std::size_t kMaxBytes = 80;
   std::size_t end = std::min(text.size(), kMaxBytes);
   while (end > 0 && end < text.size() && (text[end] & 0xC0) == 0x80) --end;
-  std::string shown;
-  for (const char c : printable(text.substr(0, end))) {
-    shown += c == '\n' ? std::string("\\x0a") : std::string(1, c);
-  }
-  return shown + (end < text.size() ? "..." : "");
+  return printable(text.substr(0, end)) + (end < text.size() ? "..." : "");
 }
 
 /// Calls visit(part) with what stands before, between and after the separators.

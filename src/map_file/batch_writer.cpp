@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kFramesPerBatch = 32;
 constexpr std::chrono::seconds kMaxDelay{1};
-/// 12 MB of features, and 50 MB of images where these are kept.
+/// 12 MB of features, and 50 MB of images if these are saved.
 constexpr std::size_t kMaxPendingFrames = 256;
 
 MapLoop loop_of(const Detection& detection, int session) {
@@ -114,12 +114,12 @@ void BatchWriter::commit_batches() {
 }
 
 void BatchWriter::commit(const std::vector<AddedFrame>& batch) {
-  begin_commit(*database_);
+  Commit commit(*database_);
   if (!rows_) rows_.emplace(*database_);
   session_.frames = batch.back().detection.frame + 1;
   rows_->write(session_);
   for (const AddedFrame& frame : batch) write(frame);
-  database_->execute("COMMIT");
+  commit.end();
 }
 
 void BatchWriter::write(const AddedFrame& frame) {

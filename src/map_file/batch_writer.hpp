@@ -19,12 +19,12 @@
 
 namespace loopbit {
 
-/// A frame on its way to a map.
+/// A frame to be written to a map.
 struct AddedFrame {
   BinaryContent content;
   Detection detection;
   std::shared_ptr<const Features> features;
-  cv::Mat image = {};  ///< a copy of it; empty if none is kept
+  cv::Mat image = {};  ///< a copy; empty if no image is saved
 };
 
 /// Commits the frames of one session in batches, on a thread of its own. The id of frame k's place
@@ -34,26 +34,26 @@ class BatchWriter {
   /// `encode_image` may be empty.
   BatchWriter(Database database, MapSession session, std::int64_t first_place,
               EncodeImage encode_image);
-  /// Leaves what is not committed.
+  /// Drops uncommitted frames.
   ~BatchWriter();
   BatchWriter(const BatchWriter&) = delete;
   BatchWriter& operator=(const BatchWriter&) = delete;
   BatchWriter(BatchWriter&&) = delete;
   BatchWriter& operator=(BatchWriter&&) = delete;
 
-  /// Waits where too many frames are pending. Throws the Error of an earlier frame.
+  /// Waits while too many frames are pending. Throws the Error of an earlier frame.
   void add(AddedFrame frame);
 
   /// Waits until all is committed. Throws the Error if it cannot be.
   void flush();
 
-  /// Of a frame that is not committed yet; else null.
+  /// The features of a frame that is not committed yet, otherwise null.
   [[nodiscard]] std::shared_ptr<const Features> pending(int frame) const;
 
   [[nodiscard]] std::int64_t saved_frames() const;
 
-  /// After flush(), and once: gives up the right to write, and leaves one file without a log beside
-  /// it, if no reader holds the log.
+  /// Call this once, after flush(). Releases the lock of the map and, if nobody reads it, leaves
+  /// one file without a log.
   void close();
 
  private:

@@ -1,68 +1,461 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "map_copy.hpp"
-
+// The tools that copy the rows of one map to another: merging, recovering and compacting.
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <system_error>
 #include <utility>
+#include <vector>
 
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/map_tools.hpp"
+#include "loopbit/write_file.hpp"
+
+#include "map_log.hpp"
+#include "map_options.hpp"
+#include "map_rows.hpp"
 #include "map_schema.hpp"
+#include "thinning.hpp"
 
 namespace loopbit {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr std::int64_t kPlacesPerTransaction = 2048;
 
-}  // namespace
+/// Copies rows of one map to another.
+class MapCopy {
+ public:
+  /// `numbers`: the number in `to` of each session that is copied.
+  MapCopy(const Database& to, std::map<int, int> numbers)
+      : rows_(to), numbers_(std::move(numbers)) {}
 
-MapCopy::MapCopy(const Database& to, std::map<int, int> numbers)
-    : rows_(to), numbers_(std::move(numbers)) {}
+  void copy_session(MapSession session) {
+    session.session = numbers_.at(session.session);
+    rows_.write(session);
+  }
 
-void MapCopy::copy_session(MapSession session) {
-  session.session = numbers_.at(session.session);
-  rows_.write(session);
-}
+  /// False if its session is not copied. `image`: may be empty.
+  bool copy_place(MapPlace place, const Features& features,
+                  const std::vector<unsigned char>& image) {
+    if (!renumber(place.at)) return false;
+    rows_.write(place, features);
+    rows_.write_image(place, image);
+    return true;
+  }
 
-bool MapCopy::copy_place(const MapPlace& place, const Features& features, const Image& image) {
-  MapPlace copy = place;
-  if (!renumber(copy.at)) return false;
-  rows_.write(copy, features);
-  if (image) rows_.write_image(copy, *image);
-  return true;
-}
+  /// False if one of its sessions is not copied.
+  bool copy_loop(MapLoop loop) {
+    if (!renumber(loop.query) || !renumber(loop.match)) return false;
+    rows_.write(loop);
+    return true;
+  }
 
-bool MapCopy::copy_loop(MapLoop loop) {
-  if (!renumber(loop.query) || !renumber(loop.match)) return false;
-  rows_.write(loop);
-  return true;
-}
+ private:
+  [[nodiscard]] bool renumber(SessionFrame& at) const {
+    const auto found = numbers_.find(at.session);
+    if (found == numbers_.end()) return false;
+    at.session = found->second;
+    return true;
+  }
 
-bool MapCopy::renumber(SessionFrame& at) const {
-  const auto found = numbers_.find(at.session);
-  if (found == numbers_.end()) return false;
-  at.session = found->second;
-  return true;
-}
+  RowWriter rows_;
+  std::map<int, int> numbers_;
+};
 
+/// Which rows of a map are copied.
+struct CopyPlan {
+  std::vector<MapSession> sessions;  ///< with their loops
+  std::function<bool(const MapPlace&)> keeps_place;
+  bool keeps_images = true;
+};
+
+/// Copies the planned rows under the same numbers to a new map that nobody can see yet. Returns the
+/// counts of copied rows.
 MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
   std::map<int, int> numbers;
   for (const MapSession& session : plan.sessions) numbers[session.session] = session.session;
   MapCopy copy(to, std::move(numbers));
   MapCheck counts;
-  begin_commit(to);
+  std::optional<Commit> commit(std::in_place, to);
   for (const MapSession& session : plan.sessions) copy.copy_session(session);
   counts.sessions = static_cast<std::int64_t>(plan.sessions.size());
   from.for_each_place([&](const MapPlace& place) {
     if (!plan.keeps_place(place)) return;
     const auto features = from.features_of(place);
-    const Image image = plan.keeps_images ? from.image_of(place) : std::nullopt;
-    if (!features || !copy.copy_place(place, *features, image)) return;
+    const auto image = plan.keeps_images ? from.image_of(place) : std::nullopt;
+    if (!features ||
+        !copy.copy_place(place, *features, image.value_or(std::vector<unsigned char>{})))
+      return;
     counts.images += image.has_value();
     if (++counts.places % kPlacesPerTransaction == 0) {
-      to.execute("COMMIT");
-      begin_commit(to);
+      commit->end();
+      commit.emplace(to);
     }
   });
   for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);
-  to.execute("COMMIT");
+  commit->end();
+  return counts;
+}
+
+// Merging.
+
+/// Which sessions are added, and under which numbers.
+struct MergePlan {
+  std::map<int, int> numbers;     ///< from numbers in the other map to numbers in this one
+  std::vector<MapSession> added;  ///< those that this one lacks
+  std::int64_t known = 0;         ///< the number of other sessions
+};
+
+/// Throws Error (kind option) if settings differ.
+MergePlan plan_of(const std::string& into, const Database& to, const MapReader& source) {
+  Damage damage;
+  std::map<std::string, int> known;
+  std::string options;
+  for (const MapSession& session : read_sessions(to, damage)) {
+    known[session.uid] = session.session;
+    options = session.options;
+  }
+  refuse_damaged(into, damage.clauses());  // a session with an unknown uid could be added twice
+  MergePlan plan;
+  int next = next_session(to);
+  for (const MapSession& session : source.sessions()) {
+    if (options.empty()) options = session.options;
+    check_same_shape(into, options, options_of_shape(source.path(), session.options));
+    const auto found = known.find(session.uid);
+    const bool is_known = found != known.end();
+    plan.numbers[session.session] = is_known ? found->second : next++;
+    if (is_known) {
+      ++plan.known;
+    } else {
+      plan.added.push_back(session);
+    }
+  }
+  return plan;
+}
+
+/// The next merge would take an incomplete session for a known one.
+void refuse_unfinished(const std::string& from) {
+  if (!is_being_written(from)) return;
+  throw Error(ErrorKind::input, fmt::format("'{}' is being written: only a part of its session "
+                                            "would be copied; merge it when its run has ended.",
+                                            from));
+}
+
+/// Adds the sessions of `source` that `into` lacks, in one transaction.
+MergeCounts merge(const std::string& into, const Database& to, MapReader& source) {
+  const MergePlan plan = plan_of(into, to, source);
+  std::set<int> added;
+  for (const MapSession& session : plan.added) added.insert(session.session);
+
+  MergeCounts counts{.sessions = static_cast<std::int64_t>(added.size()), .known = plan.known};
+  if (!has_log(to)) {  // otherwise readers would wait for the whole commit
+    mark(to);
+    begin_log(to);
+  }
+  Commit commit(to);
+  MapCopy copy(to, plan.numbers);
+  std::int64_t id = next_place(to);
+  for (const MapSession& session : plan.added) copy.copy_session(session);
+  source.for_each_place([&](const MapPlace& place) {
+    if (!added.contains(place.at.session)) return;
+    const auto features = source.features_of(place);
+    if (!features) return;
+    MapPlace copied = place;
+    copied.id = id++;
+    counts.places += copy.copy_place(copied, *features,
+                                     source.image_of(place).value_or(std::vector<unsigned char>{}));
+  });
+  for (const MapLoop& loop : source.loops()) {
+    if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
+  }
+  refuse_damaged(source.path(), source.damage());
+  commit.end();
+  return counts;
+}
+
+// Recovering.
+
+/// All sessions; those whose description is lost get a new one.
+std::vector<MapSession> all_sessions(MapReader& map) {
+  std::map<int, MapSession> sessions;
+  for (const MapSession& session : map.sessions()) sessions[session.session] = session;
+  if (sessions.empty()) return {};  // the settings of the places are unknown
+  const MapSession pattern = sessions.begin()->second;
+  map.for_each_place([&](const MapPlace& place) {
+    auto [found, is_new] = sessions.try_emplace(place.at.session, pattern);
+    MapSession& session = found->second;
+    if (is_new) {
+      session.session = place.at.session;
+      session.uid += fmt::format("-recovered-{}", place.at.session);
+      session.name = "recovered";
+      session.frames = 0;
+    }
+    session.frames = std::max<std::int64_t>(session.frames, place.at.frame + 1);
+  });
+  std::vector<MapSession> list;
+  list.reserve(sessions.size());
+  for (const auto& [number, session] : sessions) list.push_back(session);
+  return list;
+}
+
+/// A temporary copy of a map whose first page, which lists the tables, cannot be read. That page is
+/// taken from a new map, since tables begin at the same pages in every map.
+class RepairedCopy {
+ public:
+  explicit RepairedCopy(std::string path) : path_(std::move(path)) {}
+  ~RepairedCopy() { remove_database(path_); }
+  RepairedCopy(const RepairedCopy&) = delete;
+  RepairedCopy& operator=(const RepairedCopy&) = delete;
+  RepairedCopy(RepairedCopy&&) = delete;
+  RepairedCopy& operator=(RepairedCopy&&) = delete;
+
+  /// `version`: of the map at `from`. Throws Error (kind output).
+  void make(const std::string& from, int version) const {
+    remove_database(path_);
+    const Page page = first_page(fs::file_size(from), version);
+    std::error_code error;
+    fs::copy_file(from, path_, fs::copy_options::overwrite_existing, error);
+    if (error) throw cannot_write(path_, error.value());
+    std::fstream file(path_, std::ios::binary | std::ios::in | std::ios::out);
+    file.write(page.data(), page.size());
+    if (!file.flush()) throw cannot_write(path_, errno);
+  }
+
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  using Page = std::array<char, kMapPageBytes>;
+
+  /// The first page of an empty map, but for the number of pages, which is that of `bytes`.
+  [[nodiscard]] Page first_page(std::uintmax_t bytes, int version) const {
+    close_log(open_map_for_writing(path_, version));
+    Page page{};
+    std::ifstream(path_, std::ios::binary).read(page.data(), page.size());
+    // sqlite.org/fileformat2.html, 1.3.7: the size in pages, big-endian, at byte 28.
+    const auto pages = static_cast<std::uint32_t>(bytes / kMapPageBytes);
+    for (std::size_t i = 0; i < 4; ++i) {
+      page.at(28 + i) = static_cast<char>(pages >> (24 - 8 * i));
+    }
+    return page;
+  }
+
+  std::string path_;
+};
+
+MapCheck copy_to_new(MapReader& source, const std::string& to) {
+  const CopyPlan plan{.sessions = all_sessions(source),
+                      .keeps_place = [](const MapPlace&) { return true; }};
+  const Database database = open_map_for_writing(to);
+  MapCheck counts = copy_whole(source, plan, database);
+  counts.damage = source.damage();
+  close_log(database);
+  return counts;
+}
+
+bool has_whole_image(const std::string& path) {
+  MapReader map(path);
+  bool found = false;
+  map.for_each_place([&](const MapPlace& place) { found = found || map.image_of(place); });
+  return found;
+}
+
+bool can_be_opened(const std::string& path) {
+  try {
+    const MapReader map(path);
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+Error is_there(const std::string& path) {
+  return {ErrorKind::output, fmt::format("'{}' exists; name a new file to recover to.", path)};
+}
+
+/// Throws Error (kind output) if `to` exists by now.
+void rename_to_new(const std::string& from, const std::string& to) {
+  int failed = renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE);
+  // Not every file system supports RENAME_NOREPLACE.
+  if (failed != 0 && errno == EINVAL) failed = rename(from.c_str(), to.c_str());
+  if (failed == 0) return;
+  throw errno == EEXIST ? is_there(to) : cannot_write(to, errno);
+}
+
+MapCheck recover_to_new(const std::string& from, const std::string& to) {
+  std::error_code error;
+  const bool has_page = fs::file_size(from, error) >= kMapPageBytes && !error;
+  if (is_newer_map(from) || can_be_opened(from) || !has_page) {
+    MapReader source(from);
+    return copy_to_new(source, to);
+  }
+  const RepairedCopy copy(to + ".repaired");
+  copy.make(from, kMapVersion);
+  // Perhaps the map began with version 1, where images begin at another page.
+  if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
+  MapReader source(copy.path());
+  MapCheck check = copy_to_new(source, to);
+  check.damage.insert(check.damage.begin(), "the file: its first page cannot be read");
+  return check;
+}
+
+// Compacting.
+
+std::vector<MapSession> sessions_but(const MapReader& map, const std::vector<int>& dropped) {
+  std::vector<MapSession> sessions = map.sessions();
+  for (const int number : std::set<int>(dropped.begin(), dropped.end())) {
+    const auto removed = std::erase_if(
+        sessions, [&](const MapSession& session) { return session.session == number; });
+    if (removed == 0) {
+      throw Error(ErrorKind::option, fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' "
+                                                 "shows those there are.",
+                                                 map.path(), number));
+    }
+  }
+  return sessions;
+}
+
+/// Keys are never reused, not even those of the rows dropped last.
+void keep_sequences(const Database& from, const Database& to) {
+  for (const char* table : {"session", "place"}) {
+    const auto last =
+        from.integer(fmt::format("SELECT seq FROM sqlite_sequence WHERE name = '{}'", table));
+    to.execute(
+        fmt::format("DELETE FROM sqlite_sequence WHERE name = '{0}'; INSERT INTO "
+                    "sqlite_sequence VALUES ('{0}', {1})",
+                    table, last));
+  }
+}
+
+/// Makes the empty file `part` with the mode of the one at `path`, and its owner and group as far
+/// as that is permitted.
+void make_alike(const std::string& part, const std::string& path) {
+  constexpr mode_t kOwnerOnly = 0600;
+  constexpr mode_t kAllModes = 07777;
+  const int file = open(part.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, kOwnerOnly);
+  if (file < 0) throw cannot_write(part, errno);
+  struct stat old {};
+  const bool is_alike = stat(path.c_str(), &old) == 0 && fchmod(file, old.st_mode & kAllModes) == 0;
+  const int reason = errno;
+  // Only root may change the owner; others may choose a group of theirs.
+  const bool is_given = is_alike && (fchown(file, old.st_uid, old.st_gid) == 0 ||
+                                     fchown(file, geteuid(), old.st_gid) == 0);
+  (void)is_given;
+  close(file);
+  if (!is_alike) throw cannot_write(part, reason);
+}
+
+/// Writes what remains of the map `old` to the new file `part`.
+void write_compact(const Database& old, const std::string& part, const CompactOptions& options,
+                   CompactCounts& counts) {
+  MapReader map(old.path());
+  CopyPlan plan{.sessions = sessions_but(map, options.drop_sessions),
+                .keeps_place = {},
+                .keeps_images = !options.drop_images};
+  const auto kept = remaining_places(map, options);
+  plan.keeps_place = [&](const MapPlace& place) { return kept.contains(place.id); };
+  map.for_each_place([&](const MapPlace&) { ++counts.places_before; });
+  make_alike(part, old.path());
+  const Database compact = open_map_for_writing(part);
+  counts.places_after = copy_whole(map, plan, compact).places;
+  refuse_damaged(map.path(), map.damage());
+  keep_sequences(old, compact);
+  close_log(compact);
+}
+
+/// A log beside the old file would be taken for that of the new one.
+void check_unused(const Database& old) {
+  if (!close_log(old)) {
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' is being read by another process; end that, then compact again. "
+                            "Nothing was changed.",
+                            old.path()));
+  }
+  old.execute("BEGIN EXCLUSIVE; ROLLBACK");
+}
+
+}  // namespace
+
+MergeCounts merge_map(const std::string& into, const std::string& from) {
+  auto source = std::make_unique<MapReader>(from);
+  refuse_unfinished(from);
+  const Database to = open_map_for_writing(into);
+  try {
+    const MergeCounts counts = merge(into, to, *source);
+    source.reset();  // it may read the same map
+    close_log(to);
+    return counts;
+  } catch (const Error&) {
+    source.reset();
+    close_log(to);
+    throw;
+  }
+}
+
+MapCheck recover_map(const std::string& from, const std::string& to) {
+  std::error_code error;
+  // A broken symbolic link is not replaced, either.
+  if (fs::exists(fs::symlink_status(to, error))) throw is_there(to);
+  // The map gets its name when it is complete, so a kill leaves no half of one.
+  const std::string part = to + ".part";
+  if (fs::exists(part, error) && is_being_written(part)) {
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' is being recovered by another run; wait until that ends.", to));
+  }
+  remove_database(part);
+  remove_database(to);  // the log of an earlier map
+  try {
+    MapCheck check = recover_to_new(from, part);
+    if (check.sessions > 0 || check.damage.empty()) {
+      rename_to_new(part, to);
+      return check;
+    }
+    throw Error(ErrorKind::input, fmt::format("Nothing of '{}' can be recovered: it is no map of "
+                                              "loopbit's, or no session in it is whole; use a "
+                                              "copy from before.",
+                                              from));
+  } catch (const Error&) {
+    remove_database(part);
+    throw;
+  }
+}
+
+CompactCounts compact_map(const std::string& path, const CompactOptions& options) {
+  (void)open_map_for_reading(path);  // it must exist
+  const Database old = open_map_for_writing(path);
+  const std::string file = resolved_path(path);
+  const std::string part = file + ".compact";
+  remove_database(part);
+  CompactCounts counts;
+  try {
+    write_compact(old, part, options, counts);
+    check_unused(old);
+    std::error_code error;
+    counts.bytes_before = fs::file_size(file, error);
+    if (!error) counts.bytes_after = fs::file_size(part, error);
+    if (!error) fs::rename(part, file, error);
+    if (error) throw cannot_write(path, error.value());
+  } catch (const Error&) {
+    remove_database(part);
+    throw;
+  }
   return counts;
 }
 

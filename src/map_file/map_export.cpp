@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "loopbit/map_tools.hpp"
+#include "loopbit/printable.hpp"
 
 namespace loopbit {
 namespace {
@@ -22,7 +23,7 @@ struct Edge {
   MapLoop loop;
 };
 
-/// Loops of sessions that the map has no longer are none of its edges.
+/// Loops of dropped sessions are left out.
 std::vector<Edge> edges_of(MapReader& map) {
   std::map<int, std::int64_t> first_frame;
   std::int64_t frames = 0;
@@ -70,10 +71,10 @@ std::string json(const MapReader& map, const std::vector<Edge>& edges) {
                              {"matches", loop.matches},
                              {"inliers", loop.inliers}});
   }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+  return printable_json(json.dump(2, ' ', false, Json::error_handler_t::replace)) + '\n';
 }
 
-/// g2o's text format (github.com/RainerKuemmerle/g2o, "File format"): a vertex or edge a line.
+/// g2o's text format (github.com/RainerKuemmerle/g2o, "File format"): one vertex or edge per line.
 std::string g2o(const std::vector<Edge>& edges) {
   constexpr const char* kIdentityPose = "0 0 0 0 0 0 1";
   constexpr const char* kIdentityInformation = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1";

@@ -55,7 +55,7 @@ struct MapReader::Impl {
   Database database;
   FeatureReader features;
   ImageReader images;
-  StoredFeatures stored;  ///< of the places that for_each_earlier_place gave
+  StoredFeatures stored;  ///< of the places that for_each_earlier_place() visited
   Damage damage;
   std::vector<MapSession> sessions;
 };
@@ -159,7 +159,7 @@ class MapWriter::Impl {
     writer_->close();
   }
 
-  /// Whether this process has only a copy of it, without its thread.
+  /// Whether this is the copy in a forked child, which has no thread.
   [[nodiscard]] bool is_forked() const { return getpid() != process_; }
 
   /// Throws Error (kind option) in a forked child.
@@ -208,7 +208,7 @@ class MapWriter::Impl {
                   .detection = detection,
                   .features = features,
                   .image = keeps_images_ ? halved_to_picture(image) : cv::Mat()});
-    // From here on the frame is in the map: nothing may fail.
+    // From here on nothing may fail, since the frame is in the map.
     const bool has_row = detection.status != Status::unreadable;
     const PlaceId place = places.size();
     places.add(has_row ? first_place_ + detection.frame : StoredFeatures::kNoRow,
@@ -217,7 +217,7 @@ class MapWriter::Impl {
     try {
       places.keep(place, std::move(features));
     } catch (const std::bad_alloc&) {
-      // They are read from the map, then.
+      // They are read from the map instead.
     }
   }
 
@@ -278,12 +278,12 @@ MapWriter::MapWriter(const std::string& path, const LoopDetectorOptions& options
 
 MapWriter::~MapWriter() {
   if (impl_->is_forked()) {
-    (void)impl_.release();  // its thread, its locks and its SQLite are the parent's
+    (void)impl_.release();  // its thread, locks and SQLite belong to the parent
     return;
   }
   try {
     impl_->finish();
-  } catch (...) {  // told by finish(), to those who ask
+  } catch (...) {  // callers who want the error call finish()
   }
 }
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdint>
 #include <fstream>
+#include <istream>
 #include <optional>
 #include <random>
 #include <span>
@@ -24,17 +25,20 @@
 namespace loopbit {
 namespace {
 
-// sqlite.org/fileformat2.html, 1.3: where the header says how the file is written and read, how
-// large its pages are, and the mark.
+// Offsets in the header, sqlite.org/fileformat2.html, 1.3. The mark is at SQLite's "schema cookie".
 constexpr std::size_t kWriteVersionAt = 18;
 constexpr std::size_t kReadVersionAt = 19;
 constexpr std::size_t kPageBytesAt = 16;
+constexpr std::size_t kChangesAt = 24;
+constexpr std::size_t kPagesAt = 28;
 constexpr std::size_t kMarkAt = 40;
 constexpr unsigned char kWithoutLog = 1;
 constexpr unsigned char kWithLog = 2;
 
-/// What is smaller counts the changes of tables: SQLite's own use of the place.
-constexpr std::uint32_t kLeastMark = 1U << 16U;
+/// A mark is a random number in the upper bits; the lower bits repeat the random number of the mark
+/// before. Smaller values are SQLite's own, which counts changes of tables there.
+constexpr unsigned kMarkBits = 16;
+constexpr std::uint32_t kLeastMark = 1U << kMarkBits;
 constexpr std::uint32_t kNoMark = 0;
 
 std::uint32_t big_endian(std::span<const unsigned char> bytes, std::size_t at) {
@@ -48,12 +52,17 @@ std::uint32_t mark_at(std::span<const unsigned char> header) {
   return value < kLeastMark ? kNoMark : value;
 }
 
-/// The frames of a log, one after the other, as far as they are whole.
+bool read(std::istream& file, std::span<unsigned char> bytes) {
+  file.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  return static_cast<bool>(file);
+}
+
+/// The frames of a log in order, up to the first damaged one.
 class Log {
  public:
   explicit Log(const std::string& path) : file_(path, std::ios::binary) {
     std::array<unsigned char, 32> header{};
-    if (!read(header)) return;
+    if (!read(file_, header)) return;
     constexpr std::uint32_t kMagic = 0x377f0682;  // or one more
     if ((big_endian(header, 0) & ~1U) != kMagic) return;
     is_big_endian_ = (header[3] & 1U) != 0;
@@ -67,7 +76,7 @@ class Log {
 
   /// False at the end.
   bool next() {
-    if (page_.empty() || !read(frame_) || !read(page_)) return false;
+    if (page_.empty() || !read(file_, frame_) || !read(file_, page_)) return false;
     if (!std::equal(salts_.begin(), salts_.end(), frame_.begin() + 8)) return false;
     add(std::span(frame_).first(8));
     add(page_);
@@ -80,11 +89,6 @@ class Log {
   [[nodiscard]] std::span<const unsigned char> page() const { return page_; }
 
  private:
-  bool read(std::span<unsigned char> bytes) {
-    file_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-    return static_cast<bool>(file_);
-  }
-
   void add(std::span<const unsigned char> bytes) {
     for (std::size_t at = 0; at < bytes.size(); at += 8) {
       sums_[0] += word(bytes, at) + sums_[1];
@@ -102,7 +106,7 @@ class Log {
   }
 
   std::ifstream file_;
-  bool is_big_endian_ = false;  ///< what is summed up
+  bool is_big_endian_ = false;  ///< byte order of the checksums
   std::uint32_t page_bytes_ = 0;
   std::array<unsigned char, 8> salts_{};
   std::array<std::uint32_t, 2> sums_{};
@@ -110,14 +114,14 @@ class Log {
   std::vector<unsigned char> page_;
 };
 
-/// What a log says of the file it is the log of.
+/// What a log says about its map.
 struct Origin {
-  bool is_empty = true;  ///< SQLite would find nothing in it
+  bool is_empty = true;  ///< SQLite would read nothing from it
   std::uint32_t mark = kNoMark;
   std::uint32_t page_bytes = 0;
 };
 
-/// Reads no more than it must: the first page comes first in a commit that is not very large.
+/// Reads up to the map's first page, which comes first in a commit unless that is very large.
 Origin origin_of(const std::string& log_path) {
   Log log(log_path);
   Origin origin;
@@ -137,6 +141,46 @@ std::uint32_t page_bytes_of(const Database::Header& header) {
   return value == 1 ? 65536 : value;
 }
 
+/// Whether a rollback with this journal gives the file as it was before its last commit. `header`:
+/// of the file.
+bool is_own_journal(std::istream& journal, const Database::Header& header) {
+  std::array<unsigned char, 28> start{};
+  constexpr std::array<unsigned char, 8> kMagic{0xd9, 0xd5, 0x05, 0xf9, 0x20, 0xa1, 0x63, 0xd7};
+  if (!read(journal, start) || !std::equal(kMagic.begin(), kMagic.end(), start.begin())) {
+    return true;  // SQLite ignores it
+  }
+  const std::uint32_t records = big_endian(start, 8);
+  const std::uint32_t pages = big_endian(start, 16);
+  const std::uint32_t changes = big_endian(header, kChangesAt);
+  if (pages == 0) return changes <= 1 && mark_at(header) == kNoMark;  // the file was being made
+  std::array<unsigned char, 4> number{};
+  Database::Header before{};
+  journal.seekg(big_endian(start, 20));
+  if (records == 0 || !read(journal, number)) return pages == big_endian(header, kPagesAt);
+  if (big_endian(number, 0) != 1 || !read(journal, before)) return false;
+  const std::uint32_t mark = big_endian(header, kMarkAt);
+  const std::uint32_t mark_before = big_endian(before, kMarkAt);
+  const std::uint32_t changes_before = big_endian(before, kChangesAt);
+  const bool is_next = mark % kLeastMark == mark_before >> kMarkBits;
+  return mark == mark_before ? changes - changes_before <= 1
+                             : is_next && changes - changes_before == 1;
+}
+
+std::string foreign(const std::string& file, const char* kind, const std::string& path) {
+  return fmt::format(
+      "'{0}' is the {1} of another map or of another copy of '{2}'. Nothing was read or written. "
+      "Move the {1} away, then try again.",
+      file, kind, path);
+}
+
+/// Empty, or a sentence.
+std::string journal_fault(const Database& database) {
+  const std::string journal_path = resolved_path(database.path()) + "-journal";
+  std::ifstream journal(journal_path, std::ios::binary);
+  if (is_own_journal(journal, database.header())) return "";
+  return foreign(journal_path, "journal", database.path());
+}
+
 /// Empty, or a sentence.
 std::string log_fault(const Database& database) {
   const Database::Header header = database.header();
@@ -154,11 +198,7 @@ std::string log_fault(const Database& database) {
   }
   const bool is_own =
       has_log && log.page_bytes == page_bytes_of(header) && log.mark == mark_at(header);
-  if (is_own) return "";
-  return fmt::format(
-      "'{}' is the log of another map or of another copy of '{}'. Nothing was read or written. "
-      "Move the log away, then try again.",
-      log_path, path);
+  return is_own ? "" : foreign(log_path, "log", path);
 }
 
 }  // namespace
@@ -167,7 +207,7 @@ std::string header_fault(const Database& database) {
   const Database::Header header = database.header();
   const int write = header[kWriteVersionAt];
   const int read = header[kReadVersionAt];
-  // Shorter files have none; SQLite refuses those that it cannot read.
+  // A shorter file has no header; SQLite refuses it.
   if (header[0] == 0 || (write == read && (read == kWithoutLog || read == kWithLog))) return "";
   return fmt::format(
       "the file: its header gives SQLite's write version as {} and its read version as {}; both "
@@ -176,23 +216,34 @@ std::string header_fault(const Database& database) {
 }
 
 void check_log(const Database& database) {
-  // A writer that begins or ends its log may look wrong for a moment.
+  // While a writer begins or ends its log, the two may disagree for a moment.
   constexpr int kAttempts = 5;
   constexpr std::chrono::milliseconds kPause{20};
   std::string fault;
   for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    fault = log_fault(database);
+    fault = journal_fault(database);
+    if (fault.empty()) fault = log_fault(database);
     if (fault.empty()) return;
     std::this_thread::sleep_for(kPause);
   }
   throw Error(ErrorKind::input, fault);
 }
 
-void begin_log(const Database& database) {
+void mark(const Database& database) {
   std::random_device random;
-  std::uniform_int_distribution<std::int32_t> marks(kLeastMark);
-  database.set_schema_version(marks(random));
+  std::uniform_int_distribution<std::int32_t> numbers(1, (1 << (31 - kMarkBits)) - 1);
+  const auto before = static_cast<std::int32_t>(database.integer("PRAGMA schema_version"));
+  database.set_schema_version(numbers(random) << kMarkBits | before >> kMarkBits);
+}
+
+void begin_log(const Database& database) {
   database.execute("PRAGMA journal_mode = WAL");
+  write_header(database);  // so that the mark comes first, and is soon found
+}
+
+void write_header(const Database& database) {
+  database.execute(
+      fmt::format("PRAGMA user_version = {}", database.integer("PRAGMA user_version")));
 }
 
 bool has_log(const Database& database) {
@@ -212,7 +263,7 @@ bool close_log(const Database& database) {
   };
   database.execute("PRAGMA busy_timeout = 0");
   const bool is_closed = attempt("PRAGMA journal_mode = DELETE");
-  // Else a copy of the file alone has all that no reader is in the midst of.
+  // Otherwise the file alone gets all that no reader prevents.
   if (!is_closed) attempt("PRAGMA wal_checkpoint(FULL)");
   database.execute(fmt::format("PRAGMA busy_timeout = {}", timeout_ms));
   return is_closed;

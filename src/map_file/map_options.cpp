@@ -16,9 +16,9 @@ using Json = nlohmann::ordered_json;
 
 constexpr std::array kSections{"binary_content", "surf"};
 
-/// The sections of `json` that shape places.
+/// The sections of `json` that determine places.
 Json shape_of(const std::string& path, const std::string& json) {
-  // What lies deeper is no setting, and a message that shows it would recurse into it.
+  // Settings are not nested deeper, and printing deep JSON would overflow the stack.
   const auto is_shallow = [](int depth, Json::parse_event_t /*event*/, const Json& /*value*/) {
     constexpr int kSettings = 2;
     return depth <= kSettings;

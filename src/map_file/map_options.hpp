@@ -8,21 +8,20 @@
 
 namespace loopbit {
 
-// Of a detector's settings, those of binary content and SURF shape what a map holds: places made
-// with other ones cannot be compared. All others may change from session to session.
+// The settings of binary content and SURF determine a map's places: places made with different ones
+// cannot be compared. All other settings may change between sessions.
 
-/// Throws Error (kind option) that names the first setting that differs between `json`, the
-/// options of a session of the map at `path`, and `options`, and what to do.
+/// Throws Error (kind option) that names the first such setting that differs between `json`, the
+/// options of a session in the map at `path`, and `options`.
 void check_same_shape(const std::string& path, const std::string& json,
                       const LoopDetectorOptions& options);
 
-/// Throws Error (kind option) that names the first such setting in which a `detector` differs from
-/// `made_with`, those of the map at `path`.
+/// The same for a `detector` that uses a map whose session was opened with `made_with`.
 void check_detector(const std::string& path, const LoopDetectorOptions& made_with,
                     const LoopDetectorOptions& detector);
 
-/// The defaults, with those settings of `json` that shape places. Throws Error (kind input) if it
-/// has none, or such as this version does not know.
+/// The defaults, with those settings of `json` that determine places. Throws Error (kind input) if
+/// `json` lacks them or has unknown ones.
 LoopDetectorOptions options_of_shape(const std::string& path, const std::string& json);
 
 }  // namespace loopbit

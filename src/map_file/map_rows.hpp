@@ -15,10 +15,10 @@
 
 namespace loopbit {
 
-// The rows of a map, each with a checksum over its key and values, so that no damage passes for
-// data. Readers leave out what is damaged, and say so in `damage`, a clause a row or page.
+// The rows of a map. Each has a checksum over its key and values. Readers leave out damaged rows,
+// and add one clause per row or page to `damage`.
 
-/// What was found damaged, each thing once.
+/// A list of damage without duplicates.
 class Damage {
  public:
   void add(const std::string& clause) {
@@ -32,8 +32,7 @@ class Damage {
   std::unordered_set<std::string> known_;
 };
 
-/// Throws Error (kind input) if there are `clauses`: no map is written to or copied from while
-/// damaged.
+/// Throws Error (kind input) if there are `clauses`: a damaged map is neither continued nor copied.
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);
 
 std::vector<MapSession> read_sessions(const Database& database, Damage& damage);
@@ -42,8 +41,7 @@ std::vector<MapSession> read_sessions(const Database& database, Damage& damage);
 void for_each_place(const Database& database, const std::function<void(const MapPlace&)>& visit,
                     Damage& damage);
 
-/// Calls visit(place, bytes) for each image that is listed, whether or not it is whole, in order of
-/// place.
+/// Calls visit(place, bytes) for each image, damaged or not, in order of place.
 void for_each_image(const Database& database,
                     const std::function<void(std::int64_t, std::int64_t)>& visit, Damage& damage);
 
@@ -54,7 +52,7 @@ class FeatureReader {
  public:
   explicit FeatureReader(const Database& database);
 
-  /// None, with a clause in `damage`, if they are missing, damaged or another place's.
+  /// None, with a clause in `damage`, if they are missing, damaged or belong to another place.
   std::optional<Features> read(std::int64_t place, const SessionFrame& at, Damage& damage);
 
  private:
@@ -66,23 +64,24 @@ class ImageReader {
  public:
   explicit ImageReader(const Database& database);
 
-  /// None if none was kept, or, with a clause in `damage`, if it is damaged or another place's.
+  /// None if there is no image or, with a clause in `damage`, if it is damaged or belongs to
+  /// another place.
   std::optional<std::vector<unsigned char>> read(std::int64_t place, const SessionFrame& at,
                                                  Damage& damage);
 
  private:
-  std::optional<Statement> row_;  ///< none in a map of a version without images
+  std::optional<Statement> row_;  ///< none if the map's version has no images
 };
 
-/// Writes rows within whatever transaction there is. Throws Error (kind output).
+/// Writes rows in the current transaction. Throws Error (kind output).
 class RowWriter {
  public:
   explicit RowWriter(const Database& database);
 
-  /// A session that is there is given the new number of frames.
+  /// Of an existing session, updates the number of frames.
   void write(const MapSession& session);
   void write(const MapPlace& place, const Features& features);
-  /// Nothing if there are no bytes.
+  /// Does nothing if there are no bytes.
   void write_image(const MapPlace& place, std::span<const unsigned char> jpeg);
   void write(const MapLoop& loop);
 

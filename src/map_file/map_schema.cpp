@@ -24,7 +24,7 @@ namespace {
 struct Table {
   const char* name;
   const char* definition;  ///< as SQLite keeps it
-  int since = 1;           ///< the version of maps that brought it
+  int since = 1;           ///< the first version of maps that has it
 };
 
 constexpr std::array kTables{
@@ -49,7 +49,7 @@ constexpr std::array kTables{
           "NOT NULL)",
           kFirstVersionWithImages}};
 
-/// SQLite makes it for AUTOINCREMENT.
+/// SQLite creates it for AUTOINCREMENT.
 constexpr Table kSequences{"sqlite_sequence", "CREATE TABLE sqlite_sequence(name,seq)"};
 
 Database::Remedies remedies(const std::string& path) {
@@ -61,7 +61,7 @@ Database::Remedies remedies(const std::string& path) {
                               path)};
 }
 
-/// Throws Error (kind input) if there is no file, or the system does not say.
+/// Throws Error (kind input) unless `path` is a file.
 void check_is_file(const std::string& path) {
   std::error_code error;
   const auto type = std::filesystem::status(path, error).type();
@@ -80,7 +80,7 @@ void check_is_file(const std::string& path) {
   throw Error(ErrorKind::input, fmt::format("'{}' {}.", database.path(), why));
 }
 
-/// A map has the tables of its version and no others: no view or trigger of a stranger is run.
+/// A map has exactly the tables of its version, so no foreign view or trigger is ever run.
 void check_tables(const Database& database, int version) {
   Statement rows(database, "SELECT name, sql FROM sqlite_schema");
   std::ptrdiff_t known = 0;
@@ -120,18 +120,17 @@ int checked_version(const Database& database) {
   return static_cast<int>(version);
 }
 
-/// Versions so far add tables; an empty file has version 0.
+/// Each version so far adds tables. An empty file has version 0.
 void migrate(const Database& database, int from, int to) {
   if (from >= to) return;
-  database.execute("BEGIN IMMEDIATE");
   for (const Table& table : kTables) {
     if (table.since > from && table.since <= to) database.execute(table.definition);
   }
-  database.execute(fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}; COMMIT",
-                               kMapApplicationId, to));
+  database.execute(
+      fmt::format("PRAGMA application_id = {}; PRAGMA user_version = {}", kMapApplicationId, to));
 }
 
-/// Opens a file, made if there is none, with the right to write it.
+/// Opens or creates a file and locks it for writing.
 Database lock_map(const std::string& path) {
   while (true) {
     Database database(path, Database::Access::create, remedies(path));
@@ -145,7 +144,7 @@ Database lock_map(const std::string& path) {
   }
 }
 
-/// Throws Error (kind output) where a log would be missed or cannot be made.
+/// Throws Error (kind output) if a log would be overlooked or cannot be created.
 void check_may_be_written(const std::string& path) {
   if (const std::string reason = other_name(path); !reason.empty()) {
     throw Error(ErrorKind::output,
@@ -173,27 +172,44 @@ Database open_map_for_writing(const std::string& path, int version) {
   check_may_be_written(path);
   check_log(database);
   // Each commit is on disk when it returns (sqlite.org/wal.html, "Performance Considerations").
-  // With EXTRA that also holds for the mark of a log, which is committed before the log begins.
+  // With EXTRA that also holds for the first commit, before the log begins.
   database.execute(fmt::format("PRAGMA page_size = {}; PRAGMA synchronous = EXTRA", kMapPageBytes));
   const int found = checked_version(database);
   if (found > 0) check_tables(database, found);
   close_log(database);  // of a run that was killed
-  // Throws if nothing can be written, or if a long read would keep the log from beginning.
+  // Throws if nothing can be written, or if a long read would prevent the log.
   database.execute("BEGIN EXCLUSIVE; ROLLBACK");
-  if (found == 0) migrate(database, found, version);
+  if (found == 0) {
+    database.execute("BEGIN IMMEDIATE");
+    migrate(database, found, version);
+    database.execute("COMMIT");
+  }
   return database;
 }
 
-void begin_commit(const Database& database) {
-  const bool is_logged = has_log(database);
+Commit::Commit(const Database& database) : Commit(database, has_log(database)) {
+  write_header(database);
   migrate(database, static_cast<int>(database.integer("PRAGMA user_version")), kMapVersion);
-  // Writes the first page, see map_log.hpp.
-  const std::string touch = fmt::format("PRAGMA user_version = {}", kMapVersion);
-  if (!is_logged) {
-    begin_log(database);
-    database.execute(touch);  // so that it comes first, and is soon found
+  if (!is_logged_) mark(database);
+}
+
+Commit::Commit(const Database& database, bool is_logged)
+    : database_(database), is_logged_(is_logged) {
+  database.execute("BEGIN IMMEDIATE");
+}
+
+Commit::~Commit() {
+  if (has_ended_) return;
+  try {
+    database_.execute("ROLLBACK");
+  } catch (const Error&) {  // SQLite has left it already
   }
-  database.execute("BEGIN IMMEDIATE; " + touch);
+}
+
+void Commit::end() {
+  database_.execute("COMMIT");
+  has_ended_ = true;
+  if (!is_logged_) begin_log(database_);
 }
 
 bool is_being_written(const std::string& path) { return OpenFile(path).is_locked(); }

@@ -8,40 +8,58 @@
 
 namespace loopbit {
 
-/// "loop" in ASCII: what file(1) and SQLite tell a map by.
+/// "loop" in ASCII, by which file(1) and SQLite recognise a map.
 inline constexpr int kMapApplicationId = 0x6c6f6f70;
 
-/// The version of the format that this library writes. It reads all before, too.
+/// The version of the format that this library writes. It also reads all earlier ones.
 inline constexpr int kMapVersion = 2;
 inline constexpr int kFirstVersionWithImages = 2;
 
-/// Large pages: features take 48 KB a place, contents are read one after the other.
+/// Pages are large because features take 48 KB per place and contents are read in sequence.
 inline constexpr int kMapPageBytes = 16384;
 
-/// Opens a map to be written, made if there is none or an empty file: with the right to write it,
-/// which the database keeps, and without writing to it, but for what a killed run left in its log.
-/// Throws Error (kind input) if the file is no map, of a newer version or damaged where its tables
-/// are listed, (kind output) if it has a writer or cannot be written. `version`: of a map that is
-/// made, to repair an older one by.
+/// Opens a map for writing, and creates it if the file is missing or empty. The database holds the
+/// lock of the map. An existing map is not changed, except that the log of a killed run is taken
+/// into it. `version`: of a new map, to repair an older one. Throws Error: kind input if the file
+/// is no map, has a newer version or a damaged list of tables; output if it has a writer or cannot
+/// be written.
 Database open_map_for_writing(const std::string& path, int version = kMapVersion);
 
-/// Begins a transaction of a map that is open to be written, which is brought to kMapVersion. What
-/// is committed survives the loss of power, and is seen by readers.
-void begin_commit(const Database& database);
+/// A transaction, which also upgrades the map to kMapVersion. It is rolled back unless end() is
+/// called. If the map has no log, the transaction goes to the file itself, and the log begins when
+/// it ends. So a transaction that fails because of damage changes no byte of the file.
+class Commit {
+ public:
+  explicit Commit(const Database& database);
+  ~Commit();
+  Commit(const Commit&) = delete;
+  Commit& operator=(const Commit&) = delete;
+  Commit(Commit&&) = delete;
+  Commit& operator=(Commit&&) = delete;
 
-/// Whether this process or another has the map open to be written. Throws Error (kind input) if
-/// there is none.
+  /// Commits. The rows are on disk when this returns.
+  void end();
+
+ private:
+  Commit(const Database& database, bool is_logged);
+
+  const Database& database_;
+  bool is_logged_;
+  bool has_ended_ = false;
+};
+
+/// Whether this process or another has the map open for writing. Throws Error (kind input) if there
+/// is no file.
 bool is_being_written(const std::string& path);
 
-/// Whether the map's version has a table of images.
+/// Whether the map's version has images.
 bool has_images(const Database& database);
 
-/// Opens a map to be read, beside a writer or without. Throws Error (kind input) as above.
+/// Opens a map for reading, also while it is written. Throws Error (kind input) as above.
 Database open_map_for_reading(const std::string& path);
 
-/// Whether the map is of a newer version; not if its first page is damaged. Throws Error (kind
-/// input) if there is no file, it may not be read, another program holds it or its log is not its
-/// own.
+/// Whether the map has a newer version; false if its first page is damaged. Throws Error (kind
+/// input) if the file is missing, unreadable or locked, or has the log of another map beside it.
 bool is_newer_map(const std::string& path);
 
 }  // namespace loopbit

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <map>
 #include <queue>
 #include <utility>
 
@@ -11,6 +12,10 @@
 
 namespace loopbit {
 namespace {
+
+using FrameKey = std::pair<int, int>;
+
+FrameKey key_of(const SessionFrame& at) { return {at.session, at.frame}; }
 
 constexpr std::size_t kNone = static_cast<std::size_t>(-1);
 
@@ -46,16 +51,16 @@ class Thinning {
 
  private:
   struct Node {
-    std::size_t previous = kNone;  ///< of those kept, in the session
+    std::size_t previous = kNone;  ///< the previous kept place of the session
     std::size_t next = kNone;
-    std::size_t substitute = kNone;  ///< what stands for it
+    std::size_t substitute = kNone;  ///< the place that can represent it
     double cost = 0;
-    double owed = 0;  ///< the largest cost of those that it stands for
+    double owed = 0;  ///< the largest cost of the places that it represents
     std::vector<std::size_t> loops_to_it;
     bool removed = false;
   };
 
-  /// Finds who stands for a place, and at what cost.
+  /// Finds the place that can represent this one, and the cost of dropping it.
   void assess(std::size_t i) {
     Node& node = nodes_[i];
     if (node.removed) return;
@@ -100,6 +105,32 @@ class Thinning {
 
 std::vector<bool> kept_places(const std::vector<ThinnedPlace>& places, std::size_t max_places) {
   return Thinning(places).kept(max_places);
+}
+
+std::set<std::int64_t> remaining_places(MapReader& map, const CompactOptions& options) {
+  const std::set<int> dropped(options.drop_sessions.begin(), options.drop_sessions.end());
+  std::vector<ThinnedPlace> places;
+  std::vector<std::int64_t> ids;
+  std::map<FrameKey, std::size_t> index;
+  map.for_each_place([&](const MapPlace& place) {
+    if (dropped.contains(place.at.session)) return;
+    index[key_of(place.at)] = places.size();
+    places.push_back({place.content, place.at.session});
+    ids.push_back(place.id);
+  });
+  if (options.max_places > 0) {
+    for (const MapLoop& loop : map.loops()) {
+      const auto query = index.find(key_of(loop.query));
+      const auto match = index.find(key_of(loop.match));
+      if (query != index.end() && match != index.end() && query != match) {
+        places[query->second].loop = match->second;
+      }
+    }
+    const auto kept = kept_places(places, static_cast<std::size_t>(options.max_places));
+    std::size_t position = 0;
+    std::erase_if(ids, [&](std::int64_t) { return !kept[position++]; });
+  }
+  return {ids.begin(), ids.end()};
 }
 
 }  // namespace loopbit

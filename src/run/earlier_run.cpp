@@ -131,7 +131,8 @@ EarlierRun::~EarlierRun() {
 }
 
 void EarlierRun::set_aside() {
-  if (is_there(aside_)) {
+  const bool half_moved = !run_files_in(part_).empty();  // by a run that was killed
+  if (!half_moved && is_there(aside_)) {
     if (!has_ended(folder_)) return remove_run(folder_);
     remove_run(aside_);
   }

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 
+from damaged_files import saved
 from harness import LOOPBIT, Skipped, attack, contents, decided_alike, decisions, rows, running
 from material import FRAMES, REPOSITORY, TINY, map_rows
 
@@ -50,6 +51,37 @@ def killed_run(case):
         case.loopbit("eval", out, "--truth", case.material.truth, codes=(0, 3))
     case.loopbit(*command, "--overwrite", "--limit", 2, codes=(0,))
     check_saved(case, path)
+
+
+def files_in(*folders):
+    return {path.name: contents(path) for folder in folders if folder.is_dir()
+            for path in folder.iterdir() if path.is_file()}
+
+
+@attack(3)
+def killed_overwrite(case):
+    """SIGKILL at random moments of runs that replace one another: the last whole one is kept."""
+    out = case.folder / "out"
+    shutil.copytree(case.material.run, out)
+    kept = files_in(out)
+    for number in range(3):
+        process = case.start("run", case.material.images, "--out", out, "--overwrite",
+                             *case.random.choice([["--no-report"], ["--limit", 5], []]))
+        time.sleep(case.random.choice([0.1, 1]) * case.random.uniform(0, case.material.run_seconds))
+        os.kill(process.pid, signal.SIGKILL)
+        case.finish(process)
+        record = out / "run.json"
+        if record.exists() and json.loads(record.read_text())["stopped_by"] == "end":
+            case.loopbit("eval", out, "--truth", case.material.truth, codes=(0,))
+            kept = files_in(out)
+            continue
+        aside, moved = files_in(out / "earlier_run"), files_in(out / "earlier_run.part", out)
+        case.expect(aside == kept or kept.items() <= moved.items(),
+                    f"after kill {number}: neither the run before nor the new one is whole")
+    case.loopbit("run", case.material.images, "--out", out, "--overwrite", "--no-report",
+                 codes=(0,))
+    case.expect(not (out / "earlier_run").exists(), "the replaced run is still there")
+    decided_alike(case, out, decisions(case.material.run), "after kills")
 
 
 @attack(1)
@@ -147,7 +179,7 @@ def file_limit(case):
     """No file may grow beyond a limit (RLIMIT_FSIZE), whatever writes it."""
     material = case.material
     path, run = mapped_run(case, case.folder, "--overwrite")
-    new, before = case.folder / "new", contents(path)
+    new, before = case.folder / "new", saved(path)
     command = case.pick([run, ["run", material.images, "--out", new], [
         "report", material.run, "--out", new], ["map", "export", path, "--out", new], [
         "map", "merge", new, path], ["map", "merge", path, material.other_map], [
@@ -158,7 +190,7 @@ def file_limit(case):
     if command[:2] != ["map", "compact"] or ran.code:
         check_saved(case, path)
     if ran.code and command[0] == "map":
-        case.expect(contents(path) == before, f"{case.words(ran)}: failed, and changed the map")
+        case.expect(saved(path) == before, f"{case.words(ran)}: failed, and changed the map")
 
 
 @attack(1)

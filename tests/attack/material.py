@@ -166,11 +166,12 @@ def damaged(data, random):
     return bytes(data)
 
 
-def map_rows(path):
-    """Places and loops of a map by what they are, apart from the keys of the tables."""
+def map_rows(path, by_uid=True):
+    """The places of a map by uid, or number, of the session, and by frame."""
     database = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
     try:
-        uid = dict(database.execute("SELECT session, uid FROM session"))
+        column = "uid" if by_uid else "session"
+        uid = dict(database.execute(f"SELECT session, {column} FROM session"))
         features = dict(database.execute("SELECT place, features FROM features"))
         return {(uid[s], f): (t, c, features.get(p)) for p, s, f, t, c in database.execute(
             "SELECT place, session, frame, timestamp, content FROM place") if s in uid}

@@ -13,6 +13,16 @@ from disturbed_runs import check_saved
 from harness import LOOPBIT, Skipped, attack, contents, running
 from material import damaged, map_rows, python
 
+LEAVE_JOURNAL = """
+import os, sqlite3, sys
+map = sqlite3.connect(sys.argv[1], isolation_level=None)
+for sql in ("PRAGMA cache_size = 1", "BEGIN IMMEDIATE", "PRAGMA user_version = 2",
+            "UPDATE session SET frames = 0",
+            "INSERT INTO features SELECT place + 10000, zeroblob(900000), 0 FROM place",
+            sys.argv[2]):
+    map.execute(sql)  # more pages than the cache holds: SQLite writes the journal and the map
+os._exit(0)
+"""
 HOLD = """
 import sys, time, loopbit
 writer = loopbit.MapWriter(sys.argv[1], loopbit.LoopDetectorOptions(), "held")
@@ -120,6 +130,27 @@ def foreign_log(case):
         places = map_rows(path)
         case.expect(all(places.get(key) == place for key, place in saved.items()),
                     "map check finds nothing, and a place is not what was saved")
+
+
+@attack(2)
+def foreign_journal(case):
+    """The journal of another map lies beside a map, as where its writer was killed."""
+    path, other = case.folder / "map.db", case.folder / "other.db"
+    maps = [case.material.map, case.material.other_map]
+    shutil.copy(maps[case.number % 2], path)
+    shutil.copy(maps[1 - case.number % 2], other)
+    change = case.random.choice(["UPDATE place SET content = zeroblob(40000)", "DELETE FROM place",
+                                 "UPDATE features SET features = zeroblob(40000)"])
+    case.finish(python(case, LEAVE_JOURNAL, other, change))
+    target = case.folder / "map.db-journal"
+    shutil.copy(case.folder / "other.db-journal", target)
+    for command in (["map", "check", path], ["map", "export", path],
+                    ["query", path, case.material.images / "000001.png", "--json"],
+                    ["map", "merge", path, case.material.other_map],
+                    ["map", "compact", path, "--drop", 1],
+                    ["run", case.material.images, "--limit", 2, "--map", path, "--out",
+                     case.folder / "out", "--no-report"]):
+        case.loopbit(*command, codes=(3,), keeps=[path, target], names=target)
 
 
 @attack(4)

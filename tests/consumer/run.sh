@@ -29,13 +29,13 @@ cmake --build "$scratch/build"
 is_static=
 [[ ! -e $prefix/lib/libloopbit.a ]] || is_static=yes
 read -ra flags < <(pkg-config --cflags --libs "$([[ $is_static ]] && echo --static || echo --shared)" loopbit)
-if [[ " ${flags[*]} " =~ " -l"(sqlite3|z)" " ]]; then
+if [[ " ${flags[*]} " =~ " -l"(sqlite3|deflate)" " ]]; then
   echo "run.sh: a program that only detects links what maps need: ${flags[*]}" >&2
   exit 1
 fi
 g++ -std=c++20 "$source/main.cpp" "${flags[@]}" -lopencv_imgcodecs -o "$scratch/by_pkg_config"
 
-# The components that are there, also where SQLite and matio are not, which only some need.
+# The components that are there, also where SQLite, zlib and pkg-config are not, which only some need.
 components() {
   cmake -S "$source/components" -B "$scratch/components" -G Ninja --fresh \
     -DCMAKE_PREFIX_PATH="$prefix" "$@" | tee "$scratch/found"
@@ -45,12 +45,14 @@ for component in loopbit map data both; do
   grep -qxF -e "-- found $component" "$scratch/found"
 done
 if [[ $is_static ]]; then
-  PKG_CONFIG_PATH='' PKG_CONFIG_LIBDIR=$scratch components
+  components -DCMAKE_DISABLE_FIND_PACKAGE_ZLIB=ON
   [[ $(grep -e '-- found' "$scratch/found") == $'-- found loopbit\n-- found map' ]]
-  grep -qF -e '-- not both: loopbit::data is not there: pkg-config finds no matio' "$scratch/found"
-  components -DCMAKE_DISABLE_FIND_PACKAGE_SQLite3=ON
-  [[ $(grep -e '-- found' "$scratch/found") == '-- found loopbit' ]]
-  grep -qF -e '-- not both: loopbit::data is not there: CMake finds no SQLite' "$scratch/found"
+  grep -qF -e '-- not both: loopbit::data is not there: zlib or matio' "$scratch/found"
+  for without in -DCMAKE_DISABLE_FIND_PACKAGE_{SQLite3,PkgConfig}=ON; do
+    components "$without"
+    [[ $(grep -e '-- found' "$scratch/found") == '-- found loopbit' ]]
+    grep -qF -e '-- not both: loopbit::data is not there: SQLite or libdeflate' "$scratch/found"
+  done
 fi
 
 if grep -rE -e '-m(avx|sse|arch|tune)' "$prefix"/lib/{,*/}{cmake/loopbit,pkgconfig/loopbit*} 2>/dev/null; then

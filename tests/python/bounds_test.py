@@ -6,6 +6,7 @@ import os
 import resource
 import subprocess
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -140,6 +141,10 @@ def test_whole_numbers_of_any_type_are_taken():
     assert loopbit.GroundTruth(strided[:, [0, 1]]).same_place["query"].tolist() == [2, 5, 8, 11]
     assert loopbit.GroundTruth(np.zeros((0, 3)), [], ()).same_place.size == 0
     assert len(loopbit.MatchList([], [], [], [])) == 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for dtype in "FO?U":
+            assert len(loopbit.MatchList(*[np.zeros(0, dtype)] * 4)) == 0
 
 
 def latin_folder(dataset, tmp_path):

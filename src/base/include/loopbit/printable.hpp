@@ -7,8 +7,12 @@
 
 namespace loopbit {
 
-/// `text`, fit to be shown to people: control characters other than line feeds, by which the name
-/// of a file could steer a terminal, are written as "\x1b". What is printable stays as it is.
+/// `text` on one line that cannot steer a terminal: control characters, which file names may
+/// contain, are written as "\x1b". The rest stays as it is.
 std::string printable(std::string_view text);
+
+/// The same JSON, fit for a terminal: DEL and C1, which JSON permits in strings, are written as
+/// "\u007f".
+std::string printable_json(std::string_view json);
 
 }  // namespace loopbit

@@ -82,8 +82,8 @@ struct PoseTruthOptions {
 /// has those within the grey radius, whatever their heading, gap or path (and all of same_place).
 /// Frames without a pose are unknown. The path is measured between frames with poses. Throws Error
 /// (kind option) for an option out of range, (kind input) for a position that is not finite or over
-/// 1e9 m. Cost: grows with the runs of places within reach, not with their frames: a camera that
-/// stands still costs little.
+/// 1e9 m, or for more than 5 million runs. Cost: grows with the runs of places within reach, not
+/// with their frames: a camera that stands still costs little.
 GroundTruth truth_from_poses(const std::vector<std::optional<CameraPose>>& poses,
                              const PoseTruthOptions& options = {});
 

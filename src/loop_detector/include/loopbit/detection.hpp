@@ -12,21 +12,21 @@ namespace loopbit {
 
 /// Why a frame is a loop, or why not.
 enum class Status {
-  loop,              ///< the match is accepted: the camera has been at this place before
-  no_earlier_place,  ///< every place so far is too recent to be a candidate
-  no_similar_place,  ///< no earlier place looks alike: no candidate
-  few_matches,       ///< candidates, but none shares enough features with the query
-  no_geometry,       ///< features are shared, but no epipolar geometry explains enough of them
-  low_score,         ///< a geometry, but too little evidence to accept the match
-  ambiguous,         ///< enough evidence, but for other places that share it, which look alike
-  unreadable,        ///< there was no usable image
+  loop,              ///< the match is accepted: the camera has been here before
+  no_earlier_place,  ///< all places so far are too recent to be candidates
+  no_similar_place,  ///< no earlier place looks similar, so there is no candidate
+  few_matches,       ///< no candidate shares enough features with the query
+  no_geometry,       ///< no epipolar geometry explains enough of the matches
+  low_score,         ///< the evidence is too weak to accept the match
+  ambiguous,         ///< enough evidence, but similar-looking places share it
+  unreadable,        ///< no usable image
 };
 
 inline constexpr std::array kAllStatuses{
     Status::loop,        Status::no_earlier_place, Status::no_similar_place, Status::few_matches,
     Status::no_geometry, Status::low_score,        Status::ambiguous,        Status::unreadable};
 
-/// "loop", "no_earlier_place", ...: the enumerator's name, as it stands in loops.csv.
+/// The enumerator's name, as in loops.csv: "loop", "no_earlier_place", ...
 std::string_view to_string(Status status);
 
 /// Wall time of the steps of one detection, in milliseconds.
@@ -39,8 +39,8 @@ struct StepTimes {
 
 /// A frame of one of a map's sessions.
 struct SessionFrame {
-  int session = 0;  ///< from 1, in the order in which the map met them
-  int frame = 0;    ///< in its session, from 0
+  int session = 0;  ///< from 1, in the order in which they were recorded
+  int frame = 0;    ///< frame number in the session, from 0
 
   bool operator==(const SessionFrame&) const = default;
 };
@@ -53,17 +53,17 @@ struct Detection {
   std::optional<PlaceId> match =
       std::nullopt;  ///< the best candidate, accepted or not, if it is a frame of this session
   std::optional<SessionFrame> earlier_match =
-      std::nullopt;       ///< the same, if it is of an earlier session of the map
+      std::nullopt;       ///< the same, if it belongs to an earlier session of the map
   double score = 0;       ///< what was compared with decision.min_score
   double similarity = 0;  ///< xi of query and match
-  int matches = 0;        ///< features shared by query and match, one to one
-  int inliers = 0;        ///< those that one epipolar geometry explains
+  int matches = 0;        ///< one-to-one feature matches between query and match
+  int inliers = 0;        ///< matches that fit one epipolar geometry
   StepTimes times = {};
 };
 
-/// A place that an image may show, with the numbers behind it; see LoopDetector::query.
+/// A candidate place for an image, with the numbers behind it; see LoopDetector::query.
 struct RankedPlace {
-  SessionFrame place;  ///< session 0 = of this session
+  SessionFrame place;  ///< session 0 = this session
   double score = 0;
   double similarity = 0;
   int matches = 0;

@@ -10,7 +10,7 @@
 
 namespace loopbit {
 
-/// One point of the world as two images show it: x from 0 (left) to 1, y from 0 (top) to 1.
+/// One point in two images: x from 0 (left) to 1, y from 0 (top) to 1.
 struct PointPair {
   cv::Point2f query;
   cv::Point2f match;
@@ -18,7 +18,7 @@ struct PointPair {
   bool operator==(const PointPair&) const = default;
 };
 
-/// What a detection rests on, for people to look at; see LoopDetector::process.
+/// The evidence for a detection, for display; see LoopDetector::process.
 struct Evidence {
   BinaryContent content;
   cv::Mat1f saliency;              ///< 64 x 64

@@ -16,55 +16,56 @@
 
 namespace loopbit {
 
-/// Tells for each camera image whether the camera has been at this place before.
+/// Tells for each camera image whether the camera has been here before.
 ///
-/// H. Wang, J. Li, M. Ran, L. Xie, "Fast Loop Closure Detection via Binary Content", 2019: binary
-/// content finds the earlier places that look alike, SURF features and epipolar geometry verify
-/// them, and agreement with the frames just before decides with them. The same images give the same
-/// answers on any processor. Not thread-safe; use one detector a thread.
+/// H. Wang, J. Li, M. Ran, L. Xie, "Fast Loop Closure Detection via Binary Content", 2019. Binary
+/// content finds similar earlier places, SURF features and epipolar geometry verify them, and
+/// agreement with the previous frames supports the decision. The same images give the same answers
+/// on any processor. Not thread-safe; use one detector per thread.
 ///
-/// Memory: at most 50 KB a place by default, nearly all of it features, and working memory of its
-/// own, which it keeps from frame to frame. With a map, features are the map's to keep: 700 bytes a
-/// place remain.
+/// Memory: at most 50 KB per place by default, nearly all of it features, plus working memory that
+/// is reused for every frame. With a map, the map stores the features, and 700 bytes per place
+/// remain.
 class LoopDetector {
  public:
   /// Throws Error (kind option) if `options` are not valid.
   explicit LoopDetector(const LoopDetectorOptions& options = {});
 
-  /// Continues `map` with a new session: all places of earlier sessions are candidates, whatever
-  /// the exclusion window. Features are kept there, and fetched when a candidate is verified.
-  /// Throws as above, if the map was made with other settings of binary_content or surf, and what
-  /// the map throws. Cost: some microseconds a place of the map.
+  /// Continues `map` with a new session. All places of earlier sessions are candidates; the
+  /// exclusion window does not apply to them. The map stores features and returns them when a
+  /// candidate is verified. Throws Error (kind option) if `options` are not valid or the map was
+  /// made with other settings of binary_content or surf, and whatever the map throws. Cost: a few
+  /// microseconds per place in the map.
   LoopDetector(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map);
   ~LoopDetector();
   LoopDetector(const LoopDetector&) = delete;
   LoopDetector& operator=(const LoopDetector&) = delete;
-  /// A detector moved from may only be assigned to or destroyed.
+  /// A moved-from detector may only be assigned to or destroyed.
   LoopDetector(LoopDetector&&) noexcept;
   LoopDetector& operator=(LoopDetector&&) noexcept;
 
   /// Detects, then adds the image as the next place.
   ///
   /// `image`: 8- or 16-bit, grey, BGR or BGRA, at least 32 x 32. `timestamp_s`: in seconds, not
-  /// before the last one; needed only where the exclusion window is given in seconds.
-  /// `evidence`: if not null, is given what the answer rests on, at the cost of one more
-  /// verification. Throws Error (kind input), and stays as it was, if the image or the time cannot
-  /// be used; so it does where memory for another place is refused (std::bad_alloc), and where
-  /// MapStorage::add throws.
+  /// before the previous one; only needed if the exclusion window is given in seconds. `evidence`:
+  /// if not null, receives the evidence for the answer, at the cost of one more verification.
+  /// Throws Error (kind input) if the image or the time cannot be used, std::bad_alloc if there is
+  /// no memory for another place, and whatever MapStorage::add throws. In each case the detector is
+  /// unchanged.
   Detection process(const cv::Mat& image, std::optional<double> timestamp_s = std::nullopt,
                     Evidence* evidence = nullptr);
 
-  /// What process() would answer now, without adding anything. `ranking`: if not null, is given all
-  /// candidates, best first, at the cost of verifying each of them; only the first can be a loop.
+  /// The answer of process(), without adding the image. `ranking`: if not null, receives all
+  /// candidates, best first, at the cost of verifying each of them. Only the first can be a loop.
   [[nodiscard]] Detection query(const cv::Mat& image,
                                 std::optional<double> timestamp_s = std::nullopt,
                                 std::vector<RankedPlace>* ranking = nullptr) const;
 
-  /// Counts a frame without a usable image, so that frame numbers keep step with the camera. It is
-  /// never a candidate.
+  /// Counts a frame that has no usable image, so that frame numbers match the camera's. It is never
+  /// a candidate.
   Detection skip(std::optional<double> timestamp_s = std::nullopt);
 
-  /// Frames of this session so far.
+  /// Number of frames in this session so far.
   [[nodiscard]] PlaceId size() const;
 
   [[nodiscard]] const LoopDetectorOptions& options() const;

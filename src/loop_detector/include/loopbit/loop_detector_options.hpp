@@ -16,10 +16,10 @@
 
 namespace loopbit {
 
-/// Which of the latest frames are too recent to be candidates. With `frames` and `seconds` both 0,
-/// recent is what the camera has had in view until now without a break, and as much again: this
-/// needs no setting for walked, driven or hand-held cameras at any frame rate, or for one that
-/// stands still (but see docs/method.md where it has done so since the run began).
+/// The most recent frames, which are never candidates. If `frames` and `seconds` are both 0, the
+/// window covers the time in which the camera has had the current view, and as much again. This
+/// works without settings for walking, driving, hand-held and standing cameras at any frame rate.
+/// docs/method.md describes the one exception: a camera that has stood still since the run began.
 struct ExclusionOptions {
   int min_frames = 10;
   int frames = 0;
@@ -29,14 +29,13 @@ struct ExclusionOptions {
   static constexpr auto fields() {
     using S = ExclusionOptions;
     return std::tuple{
-        Field{"min_frames", &S::min_frames, 1, 1'000'000,
-              "the latest frames that are never candidates, whatever else holds"},
+        Field{"min_frames", &S::min_frames, 1, 1'000'000, "smallest size of the window in frames"},
         Field{"frames", &S::frames, 0, 1'000'000'000,
-              "fixed window in frames in place of the automatic one; 0 = not fixed"},
+              "fixed window in frames instead of the automatic one; 0 = automatic"},
         Field{"seconds", &S::seconds, 0.0, 1e9,
-              "fixed window in seconds in place of the automatic one; 0 = not fixed"},
+              "fixed window in seconds instead of the automatic one; 0 = automatic"},
         Field{"in_view_inliers", &S::in_view_inliers, 8, 1000,
-              "automatic window: a frame is still in view if it shares so many inliers"}};
+              "automatic window: inliers that a frame must share to be still in view"}};
   }
 };
 
@@ -57,31 +56,29 @@ struct DecisionOptions {
     using S = DecisionOptions;
     return std::tuple{
         Field{"min_score", &S::min_score, 1.0, 1e9, "smallest score of an accepted match"},
-        Field{"full_share", &S::full_share, 0.0, 1.0,
-              "inliers count in full where they are this share of the features amid them, and by "
-              "sqrt(share / full_share) where they are less; 0 = always"},
+        Field{
+            "full_share", &S::full_share, 0.0, 1.0,
+            "an inlier counts fully if this share of the features around the inliers are inliers; "
+            "below it counts sqrt(share / full_share); 0 = always fully"},
         Field{"full_steps", &S::full_steps, 1, 1'000'000,
-              "inliers count in full once the map holds so many changes of view, and before by its "
-              "logarithm; 1 = always"},
+              "inliers count fully once the map holds this many view changes; before, in "
+              "proportion to the logarithm; 1 = always fully"},
         Field{"full_view_inliers", &S::full_view_inliers, 1, 1'000'000,
-              "inliers count in full where a view shares at most so many distinct ones with the "
-              "change of view before, and full_view_inliers / n, but at least half, where it is n"},
+              "if a frame shares n distinct inliers with the previous view change and n is larger, "
+              "an inlier counts full_view_inliers / n, but at least half"},
         switch_field("distinctness", &S::distinctness,
                      "an inlier counts less if other places have it, too"),
         Field{"chance_evidence", &S::chance_evidence, 0.0, 1000.0,
-              "evidence that different places show by chance; no more supports nothing"},
+              "evidence up to this value is chance and adds no support"},
         Field{"agreement_weight", &S::agreement_weight, 0.0, 1.0,
-              "what the support of the changes of view before adds to the score; 0 = each frame "
-              "alone"},
+              "weight of the support from earlier view changes in the score; 0 = each frame alone"},
         Field{"agreement_memory", &S::agreement_memory, 0.0, 0.99,
-              "part of the support that is left after each further change of view"},
-        Field{
-            "followed_ways", &S::followed_ways, 0, 1000,
-            "ways along the past with most support that are followed: places where they go on are "
-            "candidates whether they look alike or not; 0 = none"},
+              "share of the support that remains after each further view change"},
+        Field{"followed_ways", &S::followed_ways, 0, 1000,
+              "number of paths with most support to follow: the places where they continue are "
+              "candidates even if they do not look alike; 0 = none"},
         switch_field("count_matches", &S::count_matches,
-                     "the evidence is the number of matches alone, without geometry, as in the "
-                     "paper")};
+                     "the evidence is the number of matches, without geometry, as in the paper")};
   }
 };
 

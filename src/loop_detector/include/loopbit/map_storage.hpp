@@ -15,9 +15,9 @@
 
 namespace loopbit {
 
-/// What a LoopDetector needs of a map that outlives it; see map_file.hpp for the one on disk. The
-/// map's places are numbered from 0: those of earlier sessions in order of session and frame, then
-/// each frame that is added. One thread at a time.
+/// What a LoopDetector needs from a map that outlives it; map_file.hpp has the one on disk. Places
+/// are numbered from 0: first those of earlier sessions, by session and frame, then each frame that
+/// is added. Not thread-safe.
 class MapStorage {
  public:
   using Visit = std::function<void(const SessionFrame&, const BinaryContent&)>;
@@ -30,23 +30,23 @@ class MapStorage {
   MapStorage(MapStorage&&) = delete;
   MapStorage& operator=(MapStorage&&) = delete;
 
-  /// Throws Error (kind option) if places that `options` makes cannot be compared with the map's:
-  /// those of binary_content and surf must be the same.
+  /// Throws Error (kind option) if the settings of binary_content or surf differ from the map's,
+  /// because places made with other settings cannot be compared.
   virtual void check_options(const LoopDetectorOptions& options) = 0;
 
-  /// Calls back with each place of earlier sessions, in order.
+  /// Calls `visit` for each place of earlier sessions, in order.
   virtual void for_each_earlier_place(const Visit& visit) = 0;
 
-  /// Calls back with each loop of earlier sessions, in the order in which they were found.
+  /// Calls `visit` for each loop of earlier sessions, in the order in which they were found.
   virtual void for_each_earlier_loop(const VisitLoop& visit) = 0;
 
-  /// The features of a place; without any if they are lost. Never null.
+  /// The features of a place; empty if they are lost. Never null.
   virtual std::shared_ptr<const Features> features(PlaceId place) = 0;
 
-  /// Takes the next frame of this session, as number detection.frame. Where the detection is
-  /// `unreadable`, content, features and image are empty, and nothing but its number is kept. The
-  /// image is what the detector was given: it may be overwritten afterwards. Throws Error (kind
-  /// output) if this frame, or one before, could not be kept.
+  /// Stores the next frame of this session, as number detection.frame. If the detection is
+  /// `unreadable`, content, features and image are empty, and only the number is stored. The image
+  /// is the one the detector received and may be overwritten afterwards. Throws Error (kind output)
+  /// if this frame or an earlier one could not be stored.
   virtual void add(const Detection& detection, const BinaryContent& content,
                    std::shared_ptr<const Features> features, const cv::Mat& image) = 0;
 };
