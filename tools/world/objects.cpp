@@ -200,9 +200,10 @@ Color roof_color(const HouseStyle& style, float u, float v, float footprint) {
 }
 
 Color in_snow(Color color, std::uint32_t seed, float x, float y, float season) {
+  constexpr float kMostSnow = 0.6F;  // a closed cover would have fewer edges than half of one
   const float patch = value_noise(seed, x / 1.7F, y / 1.7F) + 0.5F;
   const Color wet = color * (1.0F - 0.35F * season);
-  return blend(wet, gray(0.85F), 0.9F * clamp01((season - patch) * 4.0F));
+  return blend(wet, gray(0.85F), 0.9F * clamp01((kMostSnow * season - patch) * 4.0F));
 }
 
 float glyphs(std::uint32_t seed, float x, float y, float height_m, float footprint) {

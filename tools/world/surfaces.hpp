@@ -65,7 +65,7 @@ Color ground_color(std::uint32_t seed, Vec2 at, double pitch_m, float footprint_
 /// The same where it has neither paint nor wear.
 Color bare_ground_color(std::uint32_t seed, Vec2 at, double pitch_m, float footprint);
 
-/// A surface with snow in patches; `season` is the share of it that is white, 0 to 1.
+/// A surface that is wet and has snow in patches; both grow with `season`, 0 to 1.
 Color in_snow(Color color, std::uint32_t seed, float x, float y, float season);
 
 /// Glyph-like marks, 0 to 1: letters `height_m` high on a line that begins at x = 0, y from its
