@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Runs clang-tidy over the sources of the library and the command in a finished build.
+"""Runs clang-tidy over the sources of src/ and tools/ in a finished build.
 
 A source is skipped if nothing that affects its result has changed since it last passed: its
 compile command, the .clang-tidy file, clang-tidy itself, and the content of our files that it
@@ -161,7 +161,7 @@ def main():
         seen.add(source)
         if not is_ours(source) or source.is_relative_to(build):
             continue
-        if not arguments.all and not source.is_relative_to(ROOT / "src"):
+        if not arguments.all and source.relative_to(ROOT).parts[0] not in ("src", "tools"):
             continue
         command = shlex.split(entry["command"])
         output = command[command.index("-o") + 1]

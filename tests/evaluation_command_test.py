@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""eval, compare, report and reproduce as a user meets them."""
+"""eval, compare and report as a user meets them."""
 
 import json
 import os
@@ -379,109 +379,6 @@ class EvaluationCommandTest(CommandTest):
             self.assertEqual(loopbit("eval", folder).returncode, 0, record)
         (folder / "run.json").write_text('{"score"')
         self.assert_fails(loopbit("eval", folder), 3, folder, "run.json")
-
-    # reproduce
-
-    def public_data(self):
-        """KITTI 00 and City Centre as they are laid out, with pictures of our own."""
-        data = self.scratch / "data"
-        images = sorted(self.images.iterdir())[:12]
-        kitti = data / "dataset" / "sequences" / "00"
-        (kitti / "image_0").mkdir(parents=True)
-        for image in images:
-            shutil.copy(image, kitti / "image_0")
-        (kitti / "times.txt").write_text("".join(f"{0.1 * i}\n" for i in range(len(images))))
-        (data / "dataset" / "poses").mkdir()
-        shutil.copy(self.dataset / "poses.txt", data / "dataset" / "poses" / "00.txt")
-        city = data / "City_Centre"
-        (city / "Images").mkdir(parents=True)
-        for number, image in enumerate(images + images):
-            shutil.copy(image, city / "Images" / f"{number + 1:04}.png")
-        write_mat(city / "CityCentreGroundTruth.mat", "truth", 24, [(12, 0), (23, 11)])
-        return data
-
-    def test_the_papers_tables_are_run_on_what_is_there(self):
-        ran = loopbit("reproduce", self.public_data(), "--out", self.out)
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        table = ran.stdout[ran.stdout.index("Recall in percent"):]
-        kitti = next(line for line in table.splitlines() if line.startswith("KITTI 00"))
-        self.assertEqual(kitti.split()[-4:], ["54.9", "130", "32.2", "57.2"])
-        city = next(line for line in table.splitlines() if line.startswith("City Centre"))
-        self.assertEqual(city.split()[-4:], ["27.7", "86", "-", "-"])
-        left_out = table[table.index("Not found"):].split("\n", 1)[1]
-        self.assertEqual(left_out.split("\n")[:3], ["  KITTI 02", "  KITTI 05", "  New College"])
-        record = json.loads((self.out / "citycentre" / "run.json").read_text())
-        self.assertEqual(record["counts"]["frames"], 24)
-        self.assertEqual(record["score"]["positives"], 2)
-        self.assertEqual(json.loads((self.out / "kitti00" / "run.json").read_text())["score"]
-                         ["protocol"], "kitti")
-
-    def frames_reproduced(self, rows, loops):
-        """How many frames of City Centre are read where such a matrix is its truth, and every which."""
-        data = self.public_data()
-        write_mat(data / "City_Centre" / "CityCentreGroundTruth.mat", "truth", rows, loops)
-        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        record = json.loads((self.out / "citycentre" / "run.json").read_text())
-        return record["counts"]["frames"], record["input"]["every"]
-
-    def test_a_matrix_of_left_images_only_takes_every_other_image(self):
-        self.assertEqual(self.frames_reproduced(12, [(11, 0)]), (12, 2))
-
-    def test_a_matrix_whose_loops_are_all_in_the_first_half_tells_of_all_images(self):
-        self.assertEqual(self.frames_reproduced(24, [(11, 0)]), (24, 1))
-
-    def test_a_matrix_of_left_images_only_may_be_given_again(self):
-        data = self.public_data()
-        images = data / "City_Centre" / "Images"
-        matrix = data / "City_Centre" / "CityCentreGroundTruth.mat"
-        write_mat(matrix, "truth", 12, [(4, 1), (5, 1), (11, 0)])
-        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        run = self.out / "citycentre"
-        expected = self.score(run)
-        self.assertEqual(expected["positives"], 3)
-        self.assertEqual(self.score(run, "--truth", matrix), expected)
-        both = self.scratch / "both.mat"
-        write_mat(both, "truth", 24, [(9, 3), (10, 3), (22, 1)])
-        self.assertEqual(self.score(run, "--truth", both, "--truth-views", 2), expected)
-        plain = self.scratch / "plain"
-        ran = loopbit("run", images, "--every", 2, "--out", plain, "--no-report")
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        for runs in ((run, plain), (plain, run)):
-            compared = loopbit("compare", *runs, "--truth", matrix, "--json")
-            self.assertEqual(compared.returncode, 0, compared.stderr)
-            self.assertEqual([row["positives"] for row in json.loads(compared.stdout)], [3, 3])
-        loops = (run / "loops.csv").read_text().splitlines(keepends=True)
-        (run / "loops.csv").write_text("".join(loops[:7]))  # as of a run that was killed
-        record = json.loads((run / "run.json").read_text())
-        (run / "run.json").write_text(json.dumps({**record, "stopped_by": "running"}))
-        self.assertEqual(self.score(run)["positives"], 2)
-        self.assertEqual(self.score(run, "--truth", matrix), self.score(run))
-
-    def test_a_sequence_of_which_only_poses_are_there_is_left_out(self):
-        data = self.public_data()
-        sequence = data / "dataset" / "sequences" / "02"
-        sequence.mkdir()
-        (sequence / "times.txt").write_text("0.0\n")
-        (sequence / "calib.txt").write_text("P0:\n")
-        shutil.copy(self.dataset / "poses.txt", data / "dataset" / "poses" / "02.txt")
-        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
-        self.assertEqual(ran.returncode, 0, ran.stderr)
-        self.assertIn("KITTI 02", ran.stdout[ran.stdout.index("Not found"):])
-
-    def test_what_was_run_before_a_set_that_fails_is_printed(self):
-        data = self.public_data()
-        write_mat(data / "City_Centre" / "CityCentreGroundTruth.mat", "truth", 5, [(3, 0)])
-        ran = loopbit("reproduce", data, "--out", self.out, "--no-report")
-        self.assert_fails(ran, 3, "CityCentreGroundTruth.mat")
-        table = ran.stdout[ran.stdout.index("Recall in percent"):]
-        self.assertIn("KITTI 00", table)
-
-    def test_no_public_data_at_all(self):
-        empty = self.scratch / "empty"
-        empty.mkdir()
-        self.assert_fails(loopbit("reproduce", empty, "--out", self.out), 3, empty, "--help")
 
     # Real results of others.
 

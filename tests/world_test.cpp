@@ -215,6 +215,41 @@ TEST(WorldRender, EveryFactorChangesTheLapsByItself) {
   EXPECT_GT(change_between_laps(options), 1.5 * least);
 }
 
+TEST(WorldRender, NightAndSeasonChangeLaterLapsAndNoTruth) {
+  WorldOptions options = small_world();
+  const World plain(options);
+  options.night = 0.7;
+  options.season = 0.7;
+  const World changed(options);
+  EXPECT_TRUE(same_bytes(plain.render(25), changed.render(25)));
+  EXPECT_GT(mean_difference(plain.render(25 + kFramesALap), changed.render(25 + kFramesALap)), 20);
+  EXPECT_EQ(pairs_of(plain.same_place()), pairs_of(changed.same_place()));
+  EXPECT_EQ(pairs_of(plain.near_place()), pairs_of(changed.near_place()));
+}
+
+/// How much of the structure of the first lap the second one shows.
+double similarity_of_laps(const WorldOptions& options) {
+  const World world(options);
+  double sum = 0.0;
+  for (int frame = 15; frame < kFramesALap; frame += 4) {
+    sum += correlation(edges(world.render(frame)), edges(world.render(frame + kFramesALap)));
+  }
+  return sum;
+}
+
+TEST(WorldRender, MoreNightAndMoreSeasonLeaveLessInCommon) {
+  for (double WorldOptions::*factor : {&WorldOptions::night, &WorldOptions::season}) {
+    WorldOptions options = small_world();
+    double before = similarity_of_laps(options);
+    for (const double share : {0.5, 1.0}) {
+      options.*factor = share;
+      const double similarity = similarity_of_laps(options);
+      EXPECT_LT(similarity, before) << "night " << options.night << ", season " << options.season;
+      before = similarity;
+    }
+  }
+}
+
 TEST(WorldRender, LookAlikesChangeTheHouses) {
   WorldOptions options = small_world();
   options.look_alike = 0.0;

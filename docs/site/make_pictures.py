@@ -1,11 +1,12 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Draws the pictures of the documentation from the built-in world:
+"""Draws the pictures of the documentation from the built-in world that the command LOOPBIT writes:
 
-    make_pictures.py FOLDER
+    make_pictures.py LOOPBIT FOLDER
 """
 
 import pathlib
+import subprocess
 import sys
 import tempfile
 
@@ -19,7 +20,8 @@ import numpy as np
 from matplotlib import pyplot
 
 matplotlib.rcParams["svg.hashsalt"] = "loopbit"  # the same picture is the same file
-WORLD = loopbit.WorldOptions(frames=240, spacing_m=1.5, width_px=320, height_px=240)
+WORLD = ["--frames", "240", "--world", "spacing_m=1.5", "--world", "width_px=320", "--world",
+         "height_px=240"]
 
 
 def save(figure, path):
@@ -42,9 +44,9 @@ def show(axes, picture, title):
     axes.set_title(title, fontsize=9)
 
 
-def draw_content(world, folder):
+def draw_content(images, folder):
     """An image, its saliency map and its content."""
-    image = world.render(200)
+    image = images[200]
     content = loopbit.binary_content(image)
     figure, axes = panels(1, 3)
     show(axes[0], image, "image")
@@ -53,7 +55,7 @@ def draw_content(world, folder):
     save(figure, folder / "content.svg")
 
 
-def draw_candidates(world, run, query, folder):
+def draw_candidates(images, run, query, folder):
     """The candidates of one frame."""
     contents = run.contents()
     index = loopbit.PlaceIndex()
@@ -61,15 +63,15 @@ def draw_candidates(world, run, query, folder):
         index.add(contents[frame])
     found = index.query(contents[query])[:3]
     figure, axes = panels(2, 2)
-    show(axes[0], world.render(query), f"query {query}")
+    show(axes[0], images[query], f"query {query}")
     for each, (place, similarity) in zip(list(axes)[1:], found):
-        show(each, world.render(place), f"place {place}, xi = {similarity:.2f}")
+        show(each, images[place], f"place {place}, xi = {similarity:.2f}")
     save(figure, folder / "candidates.svg")
 
 
-def draw_inliers(world, detection, folder):
+def draw_inliers(images, detection, folder):
     """The matches that fit one epipolar geometry."""
-    pair = [world.render(frame) for frame in (detection.frame, detection.match)]
+    pair = [images[detection.frame], images[detection.match]]
     query, place = map(loopbit.extract_surf, pair)
     inliers = loopbit.verify(query, place).inliers
     height, width = pair[0].shape[:2]
@@ -87,17 +89,20 @@ def draw_inliers(world, detection, folder):
 
 
 def main():
-    folder = pathlib.Path(sys.argv[1])
+    command, folder = sys.argv[1], pathlib.Path(sys.argv[2])
     folder.mkdir(parents=True, exist_ok=True)
-    world = loopbit.World(WORLD)
-    positions = [[*world.pose(frame)[:2], 0.0] for frame in range(len(world))]
     with tempfile.TemporaryDirectory(prefix="loopbit_pictures_") as scratch:
-        run = loopbit.run_folder(world.source(), pathlib.Path(scratch) / "run",
-                                 truth=world.truth(), positions_m=positions)
-        draw_content(world, folder)
+        town = pathlib.Path(scratch) / "town"
+        subprocess.run([command, "demo", *WORLD, "--write-images", town], check=True,
+                       stdout=subprocess.DEVNULL)
+        images = [frame.image for frame in loopbit.open_source(town / "images")]
+        truth = loopbit.read_truth(town / "truth.csv", not_false=town / "not_false.csv")
+        run = loopbit.run_folder(town / "images", pathlib.Path(scratch) / "run", truth=truth,
+                                 positions_m=town / "poses.txt")
+        draw_content(images, folder)
         loop = max((d for d in run.detections if d.is_loop), key=lambda d: d.score)
-        draw_candidates(world, run, loop.frame, folder)
-        draw_inliers(world, loop, folder)
+        draw_candidates(images, run, loop.frame, folder)
+        draw_inliers(images, loop, folder)
         plots = {"trajectory": loopbit.plots.trajectory(run),
                  "similarity": loopbit.plots.similarity(run),
                  "precision_recall": loopbit.plots.precision_recall(loopbit.evaluate(run)),

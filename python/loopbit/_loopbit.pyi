@@ -439,36 +439,6 @@ class VerificationOptions:
     min_matches: int
     min_spacing_scales: float
 
-class World:
-    def __init__(self, options: WorldOptions = ...) -> None: ...
-    def __len__(self) -> int: ...
-    @property
-    def options(self) -> WorldOptions: ...
-    def pose(self, frame: int) -> Tuple[float, float, float]: ...
-    def render(self, frame: int) -> numpy.typing.NDArray[numpy.uint8]: ...
-    def source(self) -> ImageSource: ...
-    def truth(self) -> GroundTruth: ...
-    def write_dataset(self, folder: str | os.PathLike[str]) -> None: ...
-
-class WorldOptions:
-    def __init__(self, *, frames: int = ..., seed: int = ..., width_px: int = ..., height_px: int = ..., laps: float = ..., spacing_m: float = ..., lateral_offset_m: float = ..., light_change: float = ..., moving_objects: float = ..., look_alike: float = ..., blank_stretch: float = ..., noise: float = ..., reverse_second_lap: bool = ..., opposite_counts: bool = ..., same_place_m: float = ..., near_place_m: float = ...) -> None: ...
-    blank_stretch: float
-    frames: int
-    height_px: int
-    laps: float
-    lateral_offset_m: float
-    light_change: float
-    look_alike: float
-    moving_objects: float
-    near_place_m: float
-    noise: float
-    opposite_counts: bool
-    reverse_second_lap: bool
-    same_place_m: float
-    seed: int
-    spacing_m: float
-    width_px: int
-
 class _RecordedRun:
     def __init__(self, source: ImageSource, out: str | os.PathLike[str], options: LoopDetectorOptions, map: str | os.PathLike[str], overwrite: bool, keep_images: bool, truth: str | os.PathLike[str], poses: str | os.PathLike[str]) -> None: ...
     def detect(self, source: ImageSource, on_bad_frame: Optional[Callable[[str], None]], evidence: bool) -> None: ...

@@ -81,8 +81,8 @@ def run(
 ) -> list[Detection]:
     """Processes a source, or what open_source() opens, frame by frame to its end.
 
-    If a frame is unreadable or has another size than the first, on_bad_frame is called, the frame
-    gets the status unreadable, and the run continues.
+    If a frame is unreadable, on_bad_frame is called, the frame gets the status unreadable, and the
+    run continues. Frames may differ in size.
     """
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)

@@ -20,7 +20,6 @@ void bind_map_tools(pybind11::module_& module);
 void bind_detector(pybind11::module_& module);
 void bind_data(pybind11::module_& module);
 void bind_evaluation(pybind11::module_& module);
-void bind_world(pybind11::module_& module);
 void bind_run(pybind11::module_& module);
 void bind_report(pybind11::module_& module);
 

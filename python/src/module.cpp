@@ -31,7 +31,6 @@ PYBIND11_MODULE(_loopbit, module) {
   python::bind_detector(module);
   python::bind_data(module);
   python::bind_evaluation(module);
-  python::bind_world(module);
   python::bind_run(module);
   python::bind_report(module);
   module.attr("__name__") = own_name;

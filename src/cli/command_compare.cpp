@@ -14,7 +14,7 @@
 #include "loopbit/run_folder.hpp"
 
 #include "commands.hpp"
-#include "open_page.hpp"
+#include "process.hpp"
 #include "run_list.hpp"
 #include "session.hpp"
 #include "summary.hpp"

@@ -8,7 +8,6 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/world.hpp"
-#include "loopbit/world_dataset.hpp"
 
 #include "commands.hpp"
 #include "progress.hpp"

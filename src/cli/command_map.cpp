@@ -15,9 +15,7 @@
 #include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
-#include "map_damage.hpp"
-#include "place_images.hpp"
-#include "ranges.hpp"
+#include "map_output.hpp"
 
 namespace loopbit::cli {
 namespace {

@@ -19,12 +19,9 @@
 #include "loopbit/printable.hpp"
 
 #include "commands.hpp"
-#include "map_damage.hpp"
-#include "place_images.hpp"
-#include "ranges.hpp"
+#include "map_output.hpp"
+#include "process.hpp"
 #include "session.hpp"
-#include "stop_signal.hpp"
-#include "streams.hpp"
 
 namespace loopbit::cli {
 namespace {

@@ -11,7 +11,7 @@
 #include "loopbit/printable.hpp"
 
 #include "commands.hpp"
-#include "open_page.hpp"
+#include "process.hpp"
 #include "run_list.hpp"
 #include "session.hpp"
 

@@ -6,7 +6,6 @@
 #include "loopbit/error.hpp"
 
 #include "commands.hpp"
-#include "ranges.hpp"
 #include "session.hpp"
 
 namespace loopbit::cli {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,10 +32,13 @@ void add_map(CLI::App& app, int& exit_code);
 void add_eval(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_report(CLI::App& app);
-void add_reproduce(CLI::App& app, const Arguments& arguments, int& exit_code);
 void add_options(CLI::App& app);
 
 /// "NAME=VALUE" in two. Throws Error (kind option) without a "=".
 std::pair<std::string, std::string> split_setting(const std::string& text);
+
+/// Replaces CLI::Range, which accepts nan and has a misleading message for 2.5 in 1 to 9.
+CLI::Validator whole_number(std::int64_t min, std::int64_t max);
+CLI::Validator number(double min, double max);
 
 }  // namespace loopbit::cli

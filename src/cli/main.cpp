@@ -17,7 +17,7 @@
 #include "loopbit/version.hpp"
 
 #include "commands.hpp"
-#include "streams.hpp"
+#include "process.hpp"
 
 namespace {
 
@@ -72,7 +72,6 @@ int run_command_line(int argc, char** argv) {
   cli::add_eval(app);
   cli::add_compare(app);
   cli::add_report(app);
-  cli::add_reproduce(app, arguments, exit_code);
   cli::add_options(app);
   check_command(app, "loopbit", 1, argc, argv);
   try {

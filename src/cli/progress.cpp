@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "streams.hpp"
+#include "process.hpp"
 
 namespace loopbit::cli {
 namespace {

@@ -15,12 +15,10 @@
 #include "loopbit/recorded_run.hpp"
 
 #include "commands.hpp"
-#include "map_damage.hpp"
+#include "map_output.hpp"
+#include "process.hpp"
 #include "progress.hpp"
-#include "ranges.hpp"
 #include "run_list.hpp"
-#include "stop_signal.hpp"
-#include "streams.hpp"
 #include "summary.hpp"
 
 namespace loopbit::cli {
@@ -147,7 +145,6 @@ int run_session(Session session, const SessionFlags& flags) {
                         .description = session.source->description(),
                         .options = options,
                         .every = session.every,
-                        .views = session.views,
                         .limit = session.limit,
                         .threads = threads,
                         .map_path = flags.map,
@@ -179,15 +176,6 @@ int run_session(Session session, const SessionFlags& flags) {
   if (fault && !stop_requested) throw Error(fault->kind(), fault->what());
   if (fault) tell(fmt::format("loopbit: {}\n", fault->what()));
   return stop_requested ? interrupted : success;
-}
-
-std::pair<std::string, std::string> split_setting(const std::string& text) {
-  const auto equals = text.find('=');
-  if (equals == std::string::npos) {
-    throw Error(ErrorKind::option,
-                fmt::format("The setting '{}' has no value; write NAME=VALUE.", text));
-  }
-  return {text.substr(0, equals), text.substr(equals + 1)};
 }
 
 }  // namespace loopbit::cli

@@ -49,7 +49,6 @@ struct Session {
   std::vector<std::string> truth_files = {};  ///< see TruthFlags::files
   std::string truth_description = {};         ///< what says what is true; empty = nothing does
   int every = 1;
-  int views = 1;
   int limit = 0;
   // Asked with the frames' times when the run is over.
   std::function<std::optional<GroundTruth>(const FrameTimes&)> truth;

@@ -9,7 +9,6 @@
 #include "loopbit/protocol.hpp"
 
 #include "commands.hpp"
-#include "ranges.hpp"
 
 namespace loopbit::cli {
 namespace {

@@ -7,18 +7,6 @@
 #include "loopbit/error.hpp"
 
 namespace loopbit {
-namespace {
-
-/// Why `frame` cannot be used, or nothing.
-std::string fault(const Frame& frame, const std::optional<cv::Size>& size) {
-  if (!frame.error.empty() || !size || frame.image.size() == *size) return frame.error;
-  return fmt::format(
-      "'{}' has {} x {} pixels, but the run began with {} x {}; run images of "
-      "different cameras one by one.",
-      frame.name, frame.image.cols, frame.image.rows, size->width, size->height);
-}
-
-}  // namespace
 
 void check_time(const Frame& frame, const LoopDetectorOptions& options) {
   const double seconds = options.exclusion.seconds;
@@ -31,16 +19,14 @@ void check_time(const Frame& frame, const LoopDetectorOptions& options) {
 
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
          const std::atomic<bool>& stop) {
-  std::optional<cv::Size> size;
+  bool is_first = true;
   const auto leave_out = [&](const Frame& frame, const std::string& reason) {
     listener.on_bad_frame(fmt::format("Frame {}: {}", detector.size(), reason));
     listener.on_detection(detector.skip(frame.timestamp_s));
   };
   const auto detect = [&](const Frame& frame) {
-    if (const std::string reason = fault(frame, size); !reason.empty()) {
-      return leave_out(frame, reason);
-    }
-    if (!size) check_time(frame, detector.options());
+    if (!frame.error.empty()) return leave_out(frame, frame.error);
+    if (is_first) check_time(frame, detector.options());
     Evidence evidence;
     Detection detection;
     try {
@@ -50,7 +36,7 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
       if (error.kind() != ErrorKind::input) throw;
       return leave_out(frame, fmt::format("'{}': {}", frame.name, error.what()));
     }
-    size = frame.image.size();
+    is_first = false;
     listener.on_detection(detection);
     if (listener.on_evidence) listener.on_evidence(detection, frame.image, evidence);
   };

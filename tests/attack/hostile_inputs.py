@@ -69,7 +69,6 @@ def places_of_a_file(case, special):
         "eval_truth": ["eval", material.run, "--truth", special],
         "compare": ["compare", material.run, special, "--truth", material.truth],
         "reported": ["report", special], "page": ["report", material.run, "--out", special],
-        "reproduce": ["reproduce", special, "--out", out],
         "town": ["demo", *TINY, "--write-images", special],
     }
 
@@ -294,8 +293,8 @@ def python_arrays(case):
     case.expect(ran.memory_mib < 2048, f"{ran.memory_mib:.0f} MiB")
 
 
-WORDS = ("run", "query", "map", "eval", "compare", "report", "options", "reproduce", "info", "list",
-         "check", "merge", "compact", "--out", "--map", "--truth", "--limit", "--every", "--set",
+WORDS = ("run", "query", "map", "eval", "compare", "report", "options", "info", "list", "check",
+         "merge", "compact", "--out", "--map", "--truth", "--limit", "--every", "--set",
          "--config", "--threads", "--json", "--drop", "--budget", "--places", "--protocol",
          "--preset", "--overwrite", "--no-report", "--help", "--", "-", "", " ", "\n", "\x1b[31m",
          "-1", "nan", "1e999", "99999999999999999999", "surf.max_keypoints=0", "=", "x" * 5000,

@@ -8,7 +8,6 @@ import os
 import pathlib
 import subprocess
 
-import numpy as np
 import pytest
 
 import loopbit
@@ -42,29 +41,37 @@ def corridor():
 
 
 @pytest.fixture(scope="session")
-def world():
-    """Two laps through a small town, in pictures that are quick to draw."""
-    return loopbit.World(loopbit.WorldOptions(frames=120, laps=2.0, spacing_m=1.9, width_px=320,
-                                              height_px=240))
-
-
-@pytest.fixture(scope="session")
-def images(world):
-    return [world.render(frame) for frame in range(len(world))]
-
-
-@pytest.fixture(scope="session")
-def dataset(world, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("dataset")
-    world.write_dataset(folder)
+def dataset(command, tmp_path_factory):
+    """Two laps through a small built-in town: 120 images, their times, poses and truth."""
+    folder = tmp_path_factory.mktemp("town") / "dataset"
+    command("demo", "--frames", 120, "--world", "laps=2", "--world", "spacing_m=1.9", "--world",
+            "width_px=320", "--world", "height_px=240", "--write-images", folder)
     return folder
 
 
 @pytest.fixture(scope="session")
-def run(world, tmp_path_factory):
-    positions = np.array([[*world.pose(frame)[:2], 0.0] for frame in range(len(world))])
-    return loopbit.run_folder(world.source(), tmp_path_factory.mktemp("runs") / "run",
-                              truth=world.truth(), positions_m=positions)
+def images(dataset):
+    return [frame.image for frame in loopbit.open_source(dataset / "images")]
+
+
+@pytest.fixture(scope="session")
+def truth(dataset):
+    return loopbit.read_truth(dataset / "truth.csv", not_false=dataset / "not_false.csv")
+
+
+@pytest.fixture(scope="session")
+def positions(dataset):
+    return loopbit.read_positions(dataset / "poses.txt", [None] * 120)
+
+
+@pytest.fixture(scope="session")
+def run(dataset, truth, positions, tmp_path_factory):
+    """A run of the data set with times, in the layout of KITTI."""
+    sequence = tmp_path_factory.mktemp("kitti")
+    (sequence / "image_0").symlink_to(dataset / "images")
+    (sequence / "times.txt").symlink_to(dataset / "times.txt")
+    return loopbit.run_folder(sequence, tmp_path_factory.mktemp("runs") / "run", truth=truth,
+                              positions_m=positions)
 
 
 def decisions(folder):

@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""The parts one by one: images, contents, features, the index, the built-in world."""
+"""The parts one by one: images, contents, features, the index, ground truth."""
 
 import pathlib
 import pickle
@@ -203,11 +203,5 @@ def test_index_is_a_full_scan(images):
         index.content(119)
 
 
-def test_world(world, images):
-    assert len(world) == 120 and images[0].shape == (240, 320, 3)
-    assert len(world.pose(3)) == 3 and world.options.laps == 2.0
-    truth = world.truth()
+def test_truth(truth):
     assert truth.same_place.dtype.names == ("query", "first", "last") and truth.ignored.size == 0
-    for frame in (-1, 120):
-        with pytest.raises(ValueError, match=f"frame is {frame}"):
-            world.render(frame)

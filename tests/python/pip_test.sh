@@ -31,7 +31,9 @@ cmake -S "$scratch/loopbit-$version" -B "$scratch/configured" -G Ninja --log-lev
 PIP_NO_INDEX=1 PIP_DISABLE_PIP_VERSION_CHECK=1 LOOPBIT_BUILD_DIR=$build \
   "$scratch/venv/bin/pip" install --quiet --no-build-isolation "$archive"
 cd "$scratch"
-"$scratch/venv/bin/python" - "$version" <<'END'
+"$build/src/cli/loopbit" demo --frames 60 --world spacing_m=4 --world width_px=160 \
+  --world height_px=120 --write-images town 2>progress
+"$scratch/venv/bin/python" - "$version" town/images <<'END'
 import importlib.metadata
 import importlib.resources
 import pathlib
@@ -42,7 +44,6 @@ import loopbit
 assert loopbit.__version__ == importlib.metadata.version("loopbit") == sys.argv[1]
 assert "venv" in pathlib.Path(loopbit.__file__).parts, loopbit.__file__
 assert {"py.typed", "_loopbit.pyi"} <= {f.name for f in importlib.resources.files(loopbit).iterdir()}
-world = loopbit.World(loopbit.WorldOptions(frames=60, spacing_m=4.0, width_px=160, height_px=120))
-run = loopbit.run_folder(world.source(), "run")
+run = loopbit.run_folder(sys.argv[2], "run")
 assert "<title>" in pathlib.Path(loopbit.write_report(run)).read_text()
 END

@@ -56,11 +56,9 @@ def test_trajectory_shows_each_loop(run):
     assert labels(axes)[:2] == ["path", "loop"]
 
 
-def test_trajectory_marks_wrong_loops(run, world, tmp_path):
-    nothing = loopbit.GroundTruth([])
-    positions = [[*world.pose(frame)[:2], 0.0] for frame in range(len(world))]
-    wrong = loopbit.run_folder(world.source(), tmp_path / "run", truth=nothing,
-                               positions_m=positions, evidence=False)
+def test_trajectory_marks_wrong_loops(dataset, positions, tmp_path):
+    wrong = loopbit.run_folder(dataset / "images", tmp_path / "run", evidence=False,
+                               truth=loopbit.GroundTruth([]), positions_m=positions)
     assert labels(plots.trajectory(wrong)) == ["path", "wrong loop"]
     with pytest.raises(ValueError, match="no contents"):
         plots.similarity(wrong)

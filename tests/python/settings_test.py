@@ -19,7 +19,6 @@ STRUCTS = [
     loopbit.ExclusionOptions,
     loopbit.DecisionOptions,
     loopbit.PoseTruthOptions,
-    loopbit.WorldOptions,
 ]
 
 # Numbers that turn themselves into whole ones, without their fractions.
@@ -41,10 +40,9 @@ def test_detector_has_the_defaults():
     assert repr(loopbit.LoopDetector().options) == repr(loopbit.LoopDetectorOptions())
 
 
-@pytest.mark.parametrize("struct", [loopbit.WorldOptions, loopbit.PoseTruthOptions])
-def test_other_defaults_are_those_of_the_command(command, struct):
-    listed = dict(re.findall(r"^  (\w+) = (\S+)  \[", command("demo", "--help"), re.MULTILINE))
-    settings = settings_of(struct())
+def test_other_defaults_are_those_of_the_command(command):
+    listed = dict(re.findall(r"^  (\w+) = (\S+)  \[", command("run", "--help"), re.MULTILINE))
+    settings = settings_of(loopbit.PoseTruthOptions())
     assert settings
     for name, value in settings.items():
         assert float(json.loads(listed[name])) == float(value), name
@@ -109,8 +107,7 @@ def test_wrong_type_is_a_type_error_that_names_the_setting(name, value):
 
 @pytest.mark.parametrize("value", FRACTIONS)
 def test_an_argument_does_not_lose_its_fraction(value, tmp_path):
-    world = loopbit.World()
-    for call in (lambda: world.render(value), lambda: loopbit.SessionFrame(0, value),
+    for call in (lambda: loopbit.SessionFrame(0, value),
                  lambda: loopbit.open_source(tmp_path, every=value),
                  lambda: loopbit.compact_map(tmp_path / "no.db", drop_sessions=[value]),
                  lambda: loopbit.GroundTruth([[5, 1]], frames=value)):

@@ -264,6 +264,25 @@ async function checkTag(page, run, frame) {
   }
 }
 
+/** Pictures of the pair that are stretched, and ends of inlier lines outside of their picture. */
+const misdrawn = () => {
+  const images = [...document.querySelectorAll("#pair .picture img")];
+  const boxes = images.map((image) => image.getBoundingClientRect());
+  const stretched = images.flatMap(({ naturalWidth, naturalHeight }, i) => {
+    const { width, height } = boxes[i];
+    const isSame = Math.abs((width * naturalHeight) / naturalWidth - height) <= 1;
+    return isSame ? [] : [`${naturalWidth} x ${naturalHeight} as ${width} x ${height}`];
+  });
+  const outside = [...document.querySelectorAll("#pair .inliers circle")].flatMap((dot, i) => {
+    const { left, right, top, bottom } = dot.getBoundingClientRect();
+    const [x, y] = [(left + right) / 2, (top + bottom) / 2];
+    const box = boxes[i % 2];
+    const isWithin = x >= box.left && x <= box.right && y >= box.top && y <= box.bottom;
+    return isWithin ? [] : [`${x}, ${y}`];
+  });
+  return [...stretched, ...outside];
+};
+
 /** Of some pairs all that the pair browser says. */
 export async function checkPairs(page) {
   const run = (await embedded(page)).runs[0];
@@ -295,6 +314,7 @@ export async function checkPairs(page) {
     const inliers = Buffer.from(pictures[0].inliers ?? "", "base64").length / 16;
     const lines = await page.$$eval("#pair .inliers line", (all) => all.length);
     assert.equal(lines, inliers, `inlier lines of ${frame}`);
+    assert.deepEqual(await page.evaluate(misdrawn), [], `pictures of ${frame} and ${match}`);
     if (!run.similarity || !pictures[0].content || !pictures[1].content) continue;
     const xi = Number(await textOf(page, "pair.xi"));
     assert.ok(

@@ -15,6 +15,14 @@ world=(--frames 150 --world laps=2 "${town[@]}")
 "$loopbit" demo "${world[@]}" --set decision.min_score=60 --out "$scratch/strict"
 "$loopbit" demo --frames 75 --world laps=1 "${town[@]}" --map "$scratch/town.db" --out "$scratch/first"
 "$loopbit" demo "${world[@]}" --map "$scratch/town.db" --out "$scratch/second"
+# The second lap is in wider images.
+"$loopbit" demo "${world[@]}" --write-images "$scratch/town"
+"$loopbit" demo "${world[@]}" --world height_px=180 --write-images "$scratch/wide"
+{
+  seq -f "$scratch/town/images/%06g.png" 0 74
+  seq -f "$scratch/wide/images/%06g.png" 75 149
+} >"$scratch/mixed.txt"
+"$loopbit" run "$scratch/mixed.txt" --out "$scratch/mixed"
 printf 'query,match,score\n120,45,0.9\n121,10,0.7\n' >"$scratch/other.csv"
 "$loopbit" compare "$scratch/demo" "$scratch/strict" "other=$scratch/other.csv" \
   --out "$scratch/compared.html"
@@ -27,4 +35,5 @@ printf 'query,match\n' >"$scratch/no_revisit.csv"
 node "$here/report_test.mjs" --playwright "$root/build/page/node_modules" --page "$root/src/report/report.html" \
   --report "$scratch/demo/report.html" --run-json "$scratch/demo/run.json" \
   --report "$scratch/second/report.html" --run-json "$scratch/second/run.json" \
+  --report "$scratch/mixed/report.html" --run-json "$scratch/mixed/run.json" \
   --report "$scratch/compared.html" --opens "$scratch/no_frames.html"

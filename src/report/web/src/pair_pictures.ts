@@ -30,7 +30,8 @@ export class PairPictures {
     ]);
     if (turn !== this.shown) return;
     const aspect = aspectOf(query) ?? aspectOf(partner) ?? 0.75;
-    const isStacked = 1 / aspect > kWide;
+    const partnerAspect = aspectOf(partner) ?? aspect;
+    const isStacked = 1 / Math.min(aspect, partnerAspect) > kWide;
     this.element.classList.toggle("stacked", isStacked);
     const isDrawn = withLines && model.isWithCandidate(selection) && query && partner;
     const inliers = isDrawn ? inliersOf(model, frame) : new Float32Array();
@@ -41,11 +42,11 @@ export class PairPictures {
     );
     this.element.replaceChildren(
       framed(query, aspect, `query ${frame}`, absenceOf(model, frame)),
-      framed(partner, aspect, name, partnerAbsence(model, selection)),
+      framed(partner, partnerAspect, name, partnerAbsence(model, selection)),
     );
     if (inliers.length > 0) {
       const mark = model.mark(frame) ?? "none";
-      this.element.append(linesOf(inliers, aspect, isStacked, mark));
+      this.element.append(linesOf(inliers, aspect, partnerAspect, isStacked, mark));
     }
   }
 }
@@ -93,10 +94,13 @@ function framed(
 function linesOf(
   inliers: Float32Array,
   aspect: number,
+  partnerAspect: number,
   isStacked: boolean,
   mark: string,
 ): SVGSVGElement {
-  const size = isStacked ? [1, 2 * aspect + kGap] : [2 + kGap, aspect];
+  const size = isStacked
+    ? [1, aspect + partnerAspect + kGap]
+    : [2 + kGap, Math.max(aspect, partnerAspect)];
   const [dx, dy] = isStacked ? [0, aspect + kGap] : [1 + kGap, 0];
   const count = inliers.length / 4;
   const density = `${count > kManyLines ? " many" : ""}${count > kCrowd ? " crowd" : ""}`;
@@ -114,7 +118,7 @@ function linesOf(
       number,
       number,
     ];
-    const ends = { x1, y1: y1 * aspect, x2: x2 + dx, y2: y2 * aspect + dy };
+    const ends = { x1, y1: y1 * aspect, x2: x2 + dx, y2: y2 * partnerAspect + dy };
     drawing.append(svg("line", ends));
     drawing.append(svg("circle", { cx: ends.x1, cy: ends.y1, r }));
     drawing.append(svg("circle", { cx: ends.x2, cy: ends.y2, r }));

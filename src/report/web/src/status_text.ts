@@ -17,7 +17,7 @@ const kMeanings: Record<string, string> = {
     "A geometry was found, but with too little evidence. It is a new place, or the overlap is too small.",
   ambiguous:
     "The evidence is strong enough, but other places share it. Look-alike places cannot be told apart.",
-  unreadable: "The image is damaged, of another size, or not an image.",
+  unreadable: "The image is damaged, too small, or not an image.",
 };
 
 const kJudged: Partial<Record<Verdict, string>> = {

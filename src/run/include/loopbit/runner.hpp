@@ -27,9 +27,9 @@ struct RunListener {
 void check_time(const Frame& frame, const LoopDetectorOptions& options);
 
 /// Processes `source` frame by frame to its end, or until `stop` is true. A frame that is
-/// unreadable or has another size than the first is reported and gets the status unreadable, and
-/// the run continues. Errors of the listener end the run. Throws Error (kind option), see
-/// check_time().
+/// unreadable is reported and gets the status unreadable, and the run continues. Frames may differ
+/// in size: each is scaled by itself. Errors of the listener end the run. Throws Error (kind
+/// option), see check_time().
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
          const std::atomic<bool>& stop);
 

@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "circuit.hpp"
 #include "scene.hpp"
@@ -34,6 +36,9 @@ struct Lot {
 
 /// The style of a house with this `seed` and depth.
 HouseStyle make_house_style(std::uint32_t seed, double depth_m);
+
+/// Changes the season of all objects by `share`, 0 to 1: leaves fall, and houses are painted anew.
+void change_season(Scene& scene, float share);
 
 /// The town: streets on a square grid everywhere, blocks with houses around their edges between
 /// them. Nothing is stored: a block's houses follow from the block's position and the seed.
@@ -81,6 +86,28 @@ class Town {
   double depth_m_;
   Row full_row_;   // along the south and the north of a block
   Row short_row_;  // between them
+};
+
+/// Slots of a cache for the pixels of one frame.
+constexpr std::size_t kMemorySlots = 512;
+
+/// Where the ground is bare, in squares of a few metres. Remembers them; not thread-safe.
+class BareGround {
+ public:
+  /// `town` must outlive this.
+  explicit BareGround(const Town& town);
+
+  [[nodiscard]] bool at(Vec2 point);
+
+ private:
+  struct Memory {
+    GridPoint square;
+    bool known = false;
+    bool bare = false;
+  };
+
+  const Town& town_;
+  std::vector<Memory> memory_;
 };
 
 }  // namespace loopbit::town

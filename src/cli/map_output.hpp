@@ -7,10 +7,17 @@
 #include <map>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "loopbit/map_file.hpp"
 
 namespace loopbit::cli {
+
+/// Warns on stderr if damaged rows were left out so far.
+void warn_of_damage(const MapReader& map);
+
+/// The same for a map that was also written.
+void warn_of_damage(const std::string& path, const std::vector<std::string>& damage);
 
 /// Writes images of a map as files SESSION_FRAME.jpg to a new folder, each on first use. The map
 /// must outlive it.

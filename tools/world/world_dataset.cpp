@@ -1,23 +1,58 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "loopbit/world_dataset.hpp"
-
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
+#include <utility>
 
 #include <fmt/format.h>
 #include <fmt/ostream.h>
 #include <opencv2/imgcodecs.hpp>
 
 #include "loopbit/error.hpp"
+#include "loopbit/world.hpp"
 
 namespace loopbit {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// The drive as a source of images.
+class WorldSource final : public ImageSource {
+ public:
+  explicit WorldSource(std::shared_ptr<const World> world) : world_(std::move(world)) {}
+
+  bool next(Frame& frame) override {
+    if (at_end()) return false;
+    frame = {fmt::format("{:06}", frame_), World::time_s(frame_), world_->render(frame_), {}};
+    ++frame_;
+    return true;
+  }
+
+  bool skip() override {
+    if (at_end()) return false;
+    ++frame_;
+    return true;
+  }
+
+  [[nodiscard]] std::optional<std::size_t> size() const override {
+    return static_cast<std::size_t>(world_->options().frames);
+  }
+
+  [[nodiscard]] std::string description() const override {
+    const WorldOptions& options = world_->options();
+    return fmt::format("built-in world, seed {}, {} frames, {} laps of {:.0f} m", options.seed,
+                       options.frames, options.laps, world_->circuit_m());
+  }
+
+ private:
+  [[nodiscard]] bool at_end() const { return frame_ >= world_->options().frames; }
+
+  std::shared_ptr<const World> world_;
+  int frame_ = 0;
+};
 
 void make_image_folder(const fs::path& images) {
   std::error_code error;
@@ -57,6 +92,10 @@ void write_rows(const fs::path& path, int frames, const RowOf& row_of) {
 }
 
 }  // namespace
+
+std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world) {
+  return std::make_unique<WorldSource>(std::move(world));
+}
 
 void write_dataset(const World& world, const std::string& folder,
                    const std::function<void(int)>& on_frame) {

@@ -8,7 +8,6 @@
 #include "light.hpp"
 #include "surfaces.hpp"
 #include "town.hpp"
-#include "town_memory.hpp"
 
 namespace loopbit::town {
 
@@ -30,14 +29,21 @@ class Shader {
   void draw_slope(const Piece& piece, std::vector<Color>& rows) const;
   void draw_board(const Piece& piece, std::vector<Color>& rows);
   [[nodiscard]] Color in_haze(Color color, double depth_m) const;
-  [[nodiscard]] Color lit(Color color, float sun) const;
+  [[nodiscard]] Color lit(Color color, float sun, Vec2 at, double z_m) const;
+  [[nodiscard]] float lamp_light(Vec2 at, double z_m) const;
+  [[nodiscard]] Color in_season(Color color, std::uint32_t seed, float x, float y) const;
   [[nodiscard]] float metres_a_pixel(double depth_m) const;
   [[nodiscard]] double rise_of(float row) const;
   template <typename ColorAt>
   void fill(const Piece& piece, std::vector<Color>& rows, const ColorAt& color_at) const;
+  template <typename ColorAt, typename GlowAt>
+  void fill_wall(const Piece& piece, Vec2 normal, std::vector<Color>& rows, const ColorAt& color_at,
+                 const GlowAt& glow_at);
   template <typename ColorAt>
   void fill_wall(const Piece& piece, Vec2 normal, std::vector<Color>& rows,
-                 const ColorAt& color_at);
+                 const ColorAt& color_at) {
+    fill_wall(piece, normal, rows, color_at, [](float /*z*/) { return 0.0F; });
+  }
 
   const Camera& camera_;
   const Scene& scene_;
@@ -48,6 +54,7 @@ class Shader {
   float upright_sun_;  // share of it on the ground
   Shadows shadows_;
   BareGround bare_ground_;
+  std::vector<Vec2> lamps_;  // that shine
   Vec2 ray_;
 };
 

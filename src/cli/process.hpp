@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <atomic>
 #include <string>
 
 namespace loopbit::cli {
@@ -22,5 +23,12 @@ void clear_terminal_line();
 
 /// Throws Error (kind output) if something that was printed did not reach stdout.
 void flush_stdout();
+
+/// From now on, a first SIGINT, SIGTERM or SIGHUP turns the result true; a second one ends the
+/// process. SIGHUP stays ignored if it was.
+const std::atomic<bool>& stop_on_signal();
+
+/// Opens a file in the user's browser with xdg-open. Throws Error (kind output) if that fails.
+void open_page(const std::string& path);
 
 }  // namespace loopbit::cli

@@ -17,6 +17,7 @@ constexpr double kHazeHalf_m = 280.0;
 constexpr float kPenumbra_m = 0.25F;
 constexpr float kContact_m = 0.6F;
 constexpr float kContactShade = 0.4F;
+constexpr float kGlobe_m = 0.56F;  // of a street lamp, from its top
 
 Vec2 normal_of(const Prism& prism, Face face) {
   const Vec2 v_axis = left_of(prism.axis);
@@ -47,7 +48,12 @@ Shader::Shader(const Camera& camera, const Scene& scene, const Town& town, const
       level_sun_(static_cast<float>(1.0 / std::sqrt(1.0 + light.rise * light.rise))),
       upright_sun_(level_sun_ * static_cast<float>(light.rise)),
       shadows_(town, light),
-      bare_ground_(town) {}
+      bare_ground_(town) {
+  if (light.lamp.r <= 0) return;
+  for (const Billboard& board : scene.billboards) {
+    if (board.shape == Shape::lamp) lamps_.push_back(board.at);
+  }
+}
 
 Color Shader::in_haze(Color color, double depth_m) const {
   const double far = depth_m / kHazeHalf_m;
@@ -55,8 +61,27 @@ Color Shader::in_haze(Color color, double depth_m) const {
   return blend(color, light_.sky_low, share);
 }
 
-Color Shader::lit(Color color, float sun) const {
-  return color * (light_.ambient + light_.sun * sun);
+Color Shader::lit(Color color, float sun, Vec2 at, double z_m) const {
+  const Color daylight = light_.ambient + light_.sun * sun;
+  if (lamps_.empty()) return color * daylight;
+  return color * (daylight + light_.lamp * lamp_light(at, z_m));
+}
+
+float Shader::lamp_light(Vec2 at, double z_m) const {
+  constexpr double kReach_m = 25.0;
+  constexpr double kLamp_m = 5.0;  // above the ground
+  constexpr double kPower = 9.0;
+  double sum = 0;
+  for (const Vec2 lamp : lamps_) {
+    const double flat_sq = dot(lamp - at, lamp - at);
+    if (flat_sq > kReach_m * kReach_m) continue;
+    sum += kPower / (2.0 + flat_sq + (kLamp_m - z_m) * (kLamp_m - z_m));
+  }
+  return std::min(1.0F, static_cast<float>(sum));
+}
+
+Color Shader::in_season(Color color, std::uint32_t seed, float x, float y) const {
+  return scene_.season > 0 ? in_snow(color, seed, x, y, scene_.season) : color;
 }
 
 float Shader::metres_a_pixel(double depth_m) const {
@@ -112,16 +137,17 @@ void Shader::draw_ground(const Piece& piece, std::vector<Color>& rows) {
                       ? bare_ground_color(ground_seed_, at, pitch_m_, std::max(away, across))
                       : ground_color(ground_seed_, at, pitch_m_, east * away + north * across,
                                      north * away + east * across);
+    color = in_season(color, ground_seed_, static_cast<float>(at.x), static_cast<float>(at.y));
     const float shade = clamp01(shadows_.height_at(at) / kPenumbra_m + 0.5F);
     const auto to_foot = static_cast<float>(piece.end_m - depth);
     color = color * (1.0F - kContactShade * clamp01(1.0F - to_foot / kContact_m));
-    return in_haze(lit(color, upright_sun_ * (1.0F - shade)), depth);
+    return in_haze(lit(color, upright_sun_ * (1.0F - shade), at, 0.0), depth);
   });
 }
 
-template <typename ColorAt>
+template <typename ColorAt, typename GlowAt>
 void Shader::fill_wall(const Piece& piece, Vec2 normal, std::vector<Color>& rows,
-                       const ColorAt& color_at) {
+                       const ColorAt& color_at, const GlowAt& glow_at) {
   const Vec2 at = camera_.eye + ray_ * piece.depth_m;
   const float facing = level_sun_ * static_cast<float>(std::max(0.0, dot(normal, light_.to_sun)));
   const float shade_m = facing > 0 ? shadows_.height_at(at + normal * kOffWall_m) : 0.0F;
@@ -130,7 +156,9 @@ void Shader::fill_wall(const Piece& piece, Vec2 normal, std::vector<Color>& rows
   fill(piece, rows, [&](float row) {
     const auto z = static_cast<float>(camera_.eye_m + rise_of(row) * piece.depth_m);
     const float in_sun = clamp01((z - shade_m) / kPenumbra_m + 0.5F);
-    return in_haze(lit(color_at(z) * sky, facing * in_sun), piece.depth_m);
+    Color color = lit(color_at(z) * sky, facing * in_sun, at, z);
+    if (light_.lamp.r > 0) color = color + light_.lamp * (0.8F * glow_at(z));
+    return in_haze(color, piece.depth_m);
   });
 }
 
@@ -149,7 +177,9 @@ void Shader::draw_wall(const Piece& piece, std::vector<Color>& rows) {
     case Wall::house: {
       const float width = side ? prism.v_max() - prism.v_min() : 2 * prism.half_length_m;
       const HouseColumn column(prism.style, prism.detail, width, along, wide);
-      return fill_wall(piece, normal, rows, [&](float z) { return column.at(z, high); });
+      return fill_wall(
+          piece, normal, rows, [&](float z) { return column.at(z, high); },
+          [&](float z) { return column.glow(z, high); });
     }
     case Wall::plain:
       return fill_wall(piece, normal, rows,
@@ -158,8 +188,9 @@ void Shader::draw_wall(const Piece& piece, std::vector<Color>& rows) {
       return fill_wall(piece, normal, rows,
                        [&](float z) { return chimney_color(prism.style, along, z, pixel); });
     case Wall::hedge:
-      return fill_wall(piece, normal, rows,
-                       [&](float z) { return hedge_color(prism.detail, along, z, pixel); });
+      return fill_wall(piece, normal, rows, [&](float z) {
+        return in_season(hedge_color(prism.detail, along, z, pixel), prism.detail, along, z);
+      });
     case Wall::car:
       return fill_wall(piece, normal, rows, [&](float z) {
         return side ? car_side_color(prism, v, z, pixel)
@@ -187,10 +218,11 @@ void Shader::draw_slope(const Piece& piece, std::vector<Color>& rows) const {
     const auto v = static_cast<float>(dot(local, v_axis));
     const float pixel =
         metres_a_pixel(depth) * static_cast<float>(1.0 + 1.0 / std::max(0.05, std::abs(relative)));
-    const Color color = prism.wall == Wall::house ? roof_color(prism.style, u, v, pixel)
+    const Color color = prism.wall == Wall::house
+                            ? in_season(roof_color(prism.style, u, v, pixel), prism.detail, u, v)
                         : prism.wall == Wall::car ? car_top_color(prism, v, pixel)
                                                   : gray(0.5F);
-    return in_haze(lit(color, sun), depth);
+    return in_haze(lit(color, sun, camera_.eye + ray_ * depth, piece.height_m), depth);
   });
 }
 
@@ -210,7 +242,10 @@ void Shader::draw_board(const Piece& piece, std::vector<Color>& rows) {
     if (covered <= 0) continue;
     const float in_sun = clamp01((z - shade_m) / kPenumbra_m + 0.5F);
     Color& seen = rows[static_cast<std::size_t>(row)];
-    seen = blend(seen, in_haze(lit(color, 0.7F * in_sun), piece.depth_m), covered);
+    Color shown = lit(color, 0.7F * in_sun, at, z);
+    const bool globe = board.shape == Shape::lamp && z > board.height_m - kGlobe_m;
+    if (globe) shown = shown + light_.lamp;
+    seen = blend(seen, in_haze(shown, piece.depth_m), covered);
   }
 }
 

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -27,6 +29,8 @@ struct WorldOptions {
   double spacing_m = 0.9;
   double lateral_offset_m = 1.0;
   double light_change = 0.6;
+  double night = 0.0;
+  double season = 0.0;
   double moving_objects = 0.5;
   double look_alike = 0.3;
   double blank_stretch = 0.12;
@@ -51,6 +55,12 @@ struct WorldOptions {
               "Offset of the later laps to the left of the first one, m"},
         Field{"light_change", &W::light_change, 0.0, 1.0,
               "Change of sun, sky and colours from lap to lap (0 = none)"},
+        Field{
+            "night", &W::night, 0.0, 1.0,
+            "Darkness from the second lap on: no sun, lamps, lit windows, noise, grey (0 = none)"},
+        Field{
+            "season", &W::season, 0.0, 1.0,
+            "Change of season from the second lap on: bare trees, snow, painted houses (0 = none)"},
         Field{"moving_objects", &W::moving_objects, 0.0, 1.0,
               "Amount of traffic; every lap has other cars and people (0 = none)"},
         Field{"look_alike", &W::look_alike, 0.0, 1.0,
@@ -127,5 +137,13 @@ class World {
 
 /// The drive as a sequence of images, 10 frames per second.
 std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world);
+
+/// Writes the whole drive as a data set: images/000000.png ..., times.txt (seconds), poses.txt
+/// (KITTI: camera to world, 3 x 4 numbers per row, x right, y down, z forward), truth.csv and
+/// not_false.csv. Calls `on_frame(n)` after each image. Throws Error (kind output) if `folder`
+/// already contains images or cannot be written.
+void write_dataset(
+    const World& world, const std::string& folder,
+    const std::function<void(int)>& on_frame = [](int) {});
 
 }  // namespace loopbit

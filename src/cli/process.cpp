@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "streams.hpp"
+#include "process.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,6 +11,9 @@
 #include <mutex>
 
 #include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
@@ -47,6 +50,14 @@ extern "C" void tell_heard(int signal) {
 }
 
 #endif
+
+std::atomic<bool> stop_requested{false};
+static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
+
+extern "C" void request_stop(int signal) {
+  stop_requested = true;
+  std::signal(signal, SIG_DFL);
+}
 
 }  // namespace
 
@@ -87,6 +98,29 @@ void flush_stdout() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
   // The reason of an earlier failure is not kept.
   throw cannot_write("standard output", errno != 0 ? errno : EIO);
+}
+
+const std::atomic<bool>& stop_on_signal() {
+  std::signal(SIGINT, request_stop);
+  std::signal(SIGTERM, request_stop);
+  if (std::signal(SIGHUP, request_stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // by nohup
+  return stop_requested;
+}
+
+void open_page(const std::string& path) {
+  std::string program = "xdg-open";
+  std::string argument = path;
+  std::array<char*, 3> arguments{program.data(), argument.data(), nullptr};
+  pid_t process = 0;
+  int status = 0;
+  const bool started =
+      posix_spawnp(&process, program.c_str(), nullptr, nullptr, arguments.data(), environ) == 0;
+  if (!started || waitpid(process, &status, 0) != process || status != 0) {
+    throw Error(ErrorKind::output,
+                fmt::format("'{}' is written, but no browser could be opened by xdg-open; open it "
+                            "by hand.",
+                            path));
+  }
 }
 
 }  // namespace loopbit::cli

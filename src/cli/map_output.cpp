@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "place_images.hpp"
+#include "map_output.hpp"
 
 #include <filesystem>
 #include <string_view>
@@ -10,6 +10,8 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/write_file.hpp"
+
+#include "process.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -29,6 +31,16 @@ void make_empty_folder(const std::string& folder) {
 }
 
 }  // namespace
+
+void warn_of_damage(const MapReader& map) { warn_of_damage(map.path(), map.damage()); }
+
+void warn_of_damage(const std::string& path, const std::vector<std::string>& damage) {
+  if (damage.empty()) return;
+  tell(
+      fmt::format("loopbit: '{0}' is damaged, and what is damaged was left out ({1}; {2} in all); "
+                  "'loopbit map check {0}' lists it.\n",
+                  path, damage.front(), damage.size()));
+}
 
 PlaceImages::PlaceImages(MapReader& map, const std::string& folder) : map_(map), folder_(folder) {
   make_empty_folder(folder);

@@ -38,6 +38,9 @@ constexpr double kCosSame = 0.8660254037844386;  // 30 degrees
 constexpr double kCosNear = 0.5;                 // 60 degrees
 constexpr double kFramesPerSecond = 10.0;
 
+constexpr float kNightNoise = 8.0F;  // standard deviation in grey levels
+constexpr float kNightGrey = 0.9F;   // share of the colour that is lost
+
 constexpr std::uint32_t kNodSalt = 0x40dU;
 constexpr std::uint32_t kNoiseSalt = 0x4015eU;
 
@@ -87,6 +90,8 @@ float bell(std::uint32_t hash) {
   return (static_cast<float>(sum) - kMean) / kSigma;
 }
 
+float luminance(Color color) { return 0.114F * color.b + 0.587F * color.g + 0.299F * color.r; }
+
 std::uint8_t to_byte(float value) {
   return static_cast<std::uint8_t>(std::clamp(value + 0.5F, 0.0F, 255.0F));
 }
@@ -108,6 +113,9 @@ struct World::Plan {
   ~Plan() = default;
 
   [[nodiscard]] Camera camera(int frame) const;
+  [[nodiscard]] float from_second_lap(int frame, double factor) const {
+    return drive.lap(frame) > 0 ? static_cast<float>(factor) : 0.0F;
+  }
   [[nodiscard]] std::vector<View> views() const;
   [[nodiscard]] PlaceRule rule(double distance_m, double cos_turn) const;
   void store(int frame, int column, const std::vector<Color>& rows, cv::Mat& image) const;
@@ -153,9 +161,11 @@ PlaceRule World::Plan::rule(double distance_m, double cos_turn) const {
 void World::Plan::store(int frame, int column, const std::vector<Color>& rows,
                         cv::Mat& image) const {
   const std::uint32_t noise = hash_of(seed ^ kNoiseSalt, frame, column);
-  const auto sigma = static_cast<float>(options.noise);
+  const float dark = from_second_lap(frame, options.night);
+  const auto sigma = static_cast<float>(options.noise) + kNightNoise * dark;
   for (int row = 0; row < image.rows; ++row) {
-    const Color& color = rows[static_cast<std::size_t>(row)];
+    Color color = rows[static_cast<std::size_t>(row)];
+    if (dark > 0) color = blend(color, gray(luminance(color)), kNightGrey * dark);
     const float grain =
         sigma > 0 ? sigma * bell(scramble(noise + static_cast<std::uint32_t>(row))) : 0.0F;
     image.at<cv::Vec3b>(row, column) = {to_byte(color.b * 255.0F + grain),
@@ -195,8 +205,11 @@ cv::Mat World::render(int frame) const {
   Scene scene;
   plan_->town.add_surroundings(camera.eye, scene);
   plan_->traffic.add_to(frame, scene);
+  const float season = plan_->from_second_lap(frame, options().season);
+  if (season > 0) change_season(scene, season);
   const Light light =
-      light_of_lap(plan_->seed, plan_->drive.lap(frame), plan_->options.light_change);
+      light_of_lap(plan_->seed, plan_->drive.lap(frame), plan_->options.light_change,
+                   plan_->from_second_lap(frame, options().night));
   const ColumnTracer tracer(camera, scene);
   Shader shader(camera, scene, plan_->town, light, plan_->seed);
 
@@ -223,48 +236,6 @@ std::vector<PlaceRun> World::near_place() const {
 
 std::size_t World::storage_bytes() const noexcept {
   return sizeof(Plan) + plan_->circuit.storage_bytes();
-}
-
-namespace {
-
-class WorldSource final : public ImageSource {
- public:
-  explicit WorldSource(std::shared_ptr<const World> world) : world_(std::move(world)) {}
-
-  bool next(Frame& frame) override {
-    if (at_end()) return false;
-    frame = {fmt::format("{:06}", frame_), World::time_s(frame_), world_->render(frame_), {}};
-    ++frame_;
-    return true;
-  }
-
-  bool skip() override {
-    if (at_end()) return false;
-    ++frame_;
-    return true;
-  }
-
-  [[nodiscard]] std::optional<std::size_t> size() const override {
-    return static_cast<std::size_t>(world_->options().frames);
-  }
-
-  [[nodiscard]] std::string description() const override {
-    const WorldOptions& options = world_->options();
-    return fmt::format("built-in world, seed {}, {} frames, {} laps of {:.0f} m", options.seed,
-                       options.frames, options.laps, world_->circuit_m());
-  }
-
- private:
-  [[nodiscard]] bool at_end() const { return frame_ >= world_->options().frames; }
-
-  std::shared_ptr<const World> world_;
-  int frame_ = 0;
-};
-
-}  // namespace
-
-std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world) {
-  return std::make_unique<WorldSource>(std::move(world));
 }
 
 }  // namespace loopbit

@@ -73,11 +73,13 @@ struct Billboard {
   float height_m = 1.0F;
   std::uint32_t detail = 0;
   float phase = 0.0F;  // of the steps of a person
+  float bare = 0.0F;   // share of a tree's leaves that have fallen
 };
 
 struct Scene {
   std::vector<Prism> prisms;
   std::vector<Billboard> billboards;
+  float season = 0.0F;  // see change_season()
 };
 
 /// Half widths across a street, from its centre line, in metres.

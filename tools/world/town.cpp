@@ -22,11 +22,13 @@ constexpr double kFarthestLot_m = 1000.0;
 constexpr double kFurnitureLine_m = 6.0;
 constexpr double kFurnitureSlot_m = 7.0;
 constexpr int kSlotsPerLamp = 3;
+constexpr double kSquare_m = 4.0;  // of bare or other ground
 
 // Salts give different things at one place different hashes.
 constexpr std::uint32_t kLotSalt = 0x10701U;
 constexpr std::uint32_t kTypeSalt = 0x7e1bU;
 constexpr std::uint32_t kStreetSalt = 0x57e7U;
+constexpr std::uint32_t kSeasonSalt = 0x5ea5U;
 
 double span_sq(Vec2 a, Vec2 b) { return dot(a - b, a - b); }
 
@@ -64,6 +66,27 @@ double from_nearest_line(double value, double pitch, double lines_a_metre) {
 }
 
 }  // namespace
+
+void change_season(Scene& scene, float share) {
+  constexpr float kPainted = 0.6F;
+  scene.season = share;
+  for (Billboard& board : scene.billboards) board.bare = share;
+  for (Prism& prism : scene.prisms) {
+    if (prism.wall != Wall::house && prism.wall != Wall::chimney) continue;
+    const std::uint32_t hash = scramble(prism.detail ^ kSeasonSalt);
+    if (unit(hash) >= kPainted * share) continue;
+    const HouseStyle painted = make_house_style(scramble(hash), kDeepest_m);
+    HouseStyle& style = prism.style;
+    style.seed = painted.seed;
+    style.masonry = painted.masonry;
+    style.wall = painted.wall;
+    style.trim = painted.trim;
+    style.frame = painted.frame;
+    style.shutter = painted.shutter;
+    style.door = painted.door;
+    style.sign = painted.sign;
+  }
+}
 
 Town::Town(std::uint32_t seed, const Circuit& circuit, double look_alike)
     : seed_(seed),
@@ -233,6 +256,19 @@ void Town::add_surroundings(Vec2 eye, Scene& scene) const {
       add_street({x, y}, {0, 1}, eye, scene);
     }
   }
+}
+
+BareGround::BareGround(const Town& town) : town_(town), memory_(kMemorySlots) {}
+
+bool BareGround::at(Vec2 point) {
+  const GridPoint square{floor_int(point.x / kSquare_m), floor_int(point.y / kSquare_m)};
+  const std::uint32_t slot = hash_of(0, square.x, square.y) % kMemorySlots;
+  Memory& memory = memory_[slot];
+  if (!memory.known || !(memory.square == square)) {
+    const Vec2 middle{(square.x + 0.5) * kSquare_m, (square.y + 0.5) * kSquare_m};
+    memory = {square, true, town_.bare_ground(middle)};
+  }
+  return memory.bare;
 }
 
 }  // namespace loopbit::town

@@ -22,6 +22,9 @@ class HouseColumn {
   /// The colour `z` metres above the ground, a pixel seeing `footprint` up the wall.
   [[nodiscard]] Color at(float z, float footprint) const;
 
+  /// How much of the pixel is a window that is lit at night, 0 to 1.
+  [[nodiscard]] float glow(float z, float footprint) const;
+
  private:
   [[nodiscard]] Color masonry(float z, float footprint) const;
   [[nodiscard]] Color ground_floor(Color color, float z, float footprint) const;
@@ -61,6 +64,9 @@ Color ground_color(std::uint32_t seed, Vec2 at, double pitch_m, float footprint_
 
 /// The same where it has neither paint nor wear.
 Color bare_ground_color(std::uint32_t seed, Vec2 at, double pitch_m, float footprint);
+
+/// A surface that is wet and has snow in patches; both grow with `season`, 0 to 1.
+Color in_snow(Color color, std::uint32_t seed, float x, float y, float season);
 
 /// Glyph-like marks, 0 to 1: letters `height_m` high on a line that begins at x = 0, y from its
 /// foot.
