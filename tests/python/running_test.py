@@ -159,23 +159,32 @@ def test_truth_may_count_two_images_as_one_frame(dataset, tmp_path):
     assert left.positives == 2
 
 
-@pytest.mark.parametrize("part, damaged, positives", [
-    ("input", {"every": 2, "views": 0}, 1),
-    ("input", {"every": 2, "views": "two"}, 1),
-    ("input", {"every": 2, "views": 9}, 2),
-    ("input", [2], 2),
-    ("score", {"tolerance_frames": "none"}, 1),
-    ("score", 7, 1),
+@pytest.mark.parametrize("part, damaged, words", [
+    ("input", {"every": 2, "views": 0}, "0 for 'input.views'"),
+    ("input", {"every": 2, "views": "two"}, "\"two\" for 'input.views'"),
+    ("input", [2], "an array for 'input'"),
+    ("score", {"tolerance_frames": "none"}, "\"none\" for 'score.tolerance_frames'"),
+    ("score", 7, "7 for 'score'"),
 ])
-def test_what_makes_no_sense_in_a_record_is_as_if_missing(dataset, tmp_path, part, damaged,
-                                                          positives):
+def test_what_makes_no_sense_in_a_record_is_named(dataset, tmp_path, part, damaged, words):
     source = loopbit.open_source(dataset / "images", every=2)
     (tmp_path / "true.csv").write_text("30,2\n31,2\n")
     run = loopbit.run_folder(source, tmp_path / "run", evidence=False, truth=tmp_path / "true.csv")
     record = json.loads(run.record_json)
     (tmp_path / "run" / "run.json").write_text(json.dumps({**record, part: damaged}))
-    given = None if part == "score" else tmp_path / "true.csv"
-    assert loopbit.evaluate(tmp_path / "run", given).decision.positives == positives
+    for read in (loopbit.evaluate, loopbit.read_run, loopbit.write_report):
+        with pytest.raises(loopbit.InputError, match=words):
+            read(tmp_path / "run")
+
+
+def test_more_views_than_frames_read_are_one_frame(dataset, tmp_path):
+    source = loopbit.open_source(dataset / "images", every=2)
+    (tmp_path / "true.csv").write_text("30,2\n31,2\n")
+    run = loopbit.run_folder(source, tmp_path / "run", evidence=False)
+    record = json.loads(run.record_json)
+    record["input"]["views"] = 9
+    (tmp_path / "run" / "run.json").write_text(json.dumps(record))
+    assert loopbit.evaluate(tmp_path / "run", tmp_path / "true.csv").decision.positives == 2
 
 
 def test_a_run_read_to_its_end_has_no_more_frames(dataset, tmp_path):

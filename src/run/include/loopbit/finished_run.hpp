@@ -11,6 +11,7 @@
 #include "loopbit/detection.hpp"
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/match_list.hpp"
+#include "loopbit/run_record.hpp"
 
 namespace loopbit {
 
@@ -18,7 +19,8 @@ namespace loopbit {
 struct FinishedRun {
   std::string path;
   std::vector<Detection> detections;
-  std::string record_json;           ///< run.json; empty if there is none
+  std::string record_json;           ///< the text of run.json; empty if there is none
+  std::optional<RunRecord> record;   ///< what it says
   std::optional<GroundTruth> truth;  ///< the truth that the run was given
   /// Camera centres, one per frame; empty if the run had no poses.
   std::vector<std::optional<cv::Vec3d>> positions_m;
