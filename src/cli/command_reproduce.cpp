@@ -52,7 +52,7 @@ struct PublicSet {
   std::string images;
   int every = 1;
   int views = 1;  ///< see RunRecord::views
-  TruthFlags truth;
+  ScoringRequest truth;
 };
 
 struct ReproduceFlags {
@@ -118,9 +118,9 @@ std::optional<std::size_t> frames_in(const std::string& images) {
   return open_source(images)->size();
 }
 
-bool has_rows_for(const TruthFlags& truth, std::size_t frames) {
+bool has_rows_for(const ScoringRequest& truth, std::size_t frames) {
   try {
-    (void)truth.read_truth(FrameTimes(frames), 1);
+    (void)truth.resolve({.times_s = FrameTimes(frames)});
     return true;
   } catch (const Error&) {
     return false;
@@ -128,10 +128,10 @@ bool has_rows_for(const TruthFlags& truth, std::size_t frames) {
 }
 
 /// Later versions of FAB-MAP's matrices have rows for the left images only.
-bool tells_of_left_only(const TruthFlags& truth, std::size_t images) {
+bool tells_of_left_only(const ScoringRequest& truth, std::size_t images) {
   if (has_rows_for(truth, images)) return false;
-  const std::optional<GroundTruth> loops = truth.read_truth({}, 1);
-  return std::ranges::all_of(loops->same_place, [&](const PlaceRun& run) {
+  const GroundTruth loops = truth.resolve({}).truth.value();
+  return std::ranges::all_of(loops.same_place, [&](const PlaceRun& run) {
     return 2 * static_cast<std::size_t>(run.query) < images;
   });
 }
@@ -164,19 +164,21 @@ std::optional<PublicSet> find_set(const fs::path& data, const PaperRow& row) {
 /// Runs one set into a folder of its own. Returns the exit code.
 int run_set(const PublicSet& set, const SessionFlags& flags, const Arguments& arguments) {
   Session session;
-  set.truth.check(1, std::nullopt);
+  set.truth.check(1, std::nullopt, false);
   session.source = subsample(open_source(set.images), static_cast<std::size_t>(set.every), 0);
   session.input = set.images;
   session.arguments = arguments;
-  session.truth_files = set.truth.files();
+  session.truth_files = {set.truth.truth};
   session.truth_description = set.truth.description();
   session.every = set.every;
   session.views = set.views;
-  session.evaluation = set.truth.evaluation();
   // Every frame that the truth counts is read.
-  session.truth = [&](const FrameTimes& times_s) { return set.truth.read_truth(times_s, 1); };
+  session.scoring = [&](const FrameTimes& times_s) {
+    return set.truth.resolve({.times_s = times_s});
+  };
   session.positions = [&](const FrameTimes& times_s) {
-    return set.truth.read_positions(times_s, 1);
+    const std::string file = set.truth.poses_file();
+    return file.empty() ? Positions{} : read_positions(file, times_s);
   };
   return run_session(std::move(session), flags);
 }

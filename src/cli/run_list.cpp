@@ -56,28 +56,22 @@ ListedRun listed_run(const std::string& text) {
     run.list = match_list(run.run->detections);
     run.truth = run.run->truth;
     run.positions_m = run.run->positions_m;
-    if (const auto& record = run.run->record) {
-      if (record->score) run.evaluation = record->score->options;
-      listed.frames.every = record->every;
-      listed.frames.views = record->views;
-      listed.frames.all = record->stopped_by == "end" && record->limit == 0;
-    }
+    run.evaluation = recorded_scoring(*run.run).evaluation;
+    listed.frames = frames_read(*run.run);
   } else {
     run.list = read_match_list(path);
+    listed.frames.times_s = run.list.times_s;
   }
-  listed.frames.times_s = run.list.times_s;
   return listed;
 }
 
 void take_truth(ReportRun& run, const TruthFlags& flags, const FramesRead& frames) {
-  const int every = frames.every_counted();
-  if (auto positions = flags.read_positions(frames.times_s, every); !positions.empty()) {
+  if (auto positions = flags.read_positions(frames); !positions.empty()) {
     run.positions_m = std::move(positions);
   }
-  if (flags.given()) {
-    run.truth = flags.read_truth(frames.times_s, every, frames.all);
-    run.evaluation = flags.evaluation();
-  }
+  auto [truth, evaluation] = flags.scoring.resolve(frames, {run.truth, run.evaluation});
+  run.truth = std::move(truth);
+  run.evaluation = std::move(evaluation);
 }
 
 ReportRun report_run(const std::string& text, const TruthFlags& flags) {

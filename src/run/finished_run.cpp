@@ -195,6 +195,21 @@ FinishedRun read_run(const std::string& path) {
   return run;
 }
 
+FramesRead frames_read(const FinishedRun& run) {
+  FramesRead frames;
+  for (const Detection& detection : run.detections) frames.times_s.push_back(detection.timestamp_s);
+  if (!run.record) return frames;
+  frames.every = run.record->every;
+  frames.views = run.record->views;
+  frames.all = run.record->stopped_by == "end" && run.record->limit == 0;
+  return frames;
+}
+
+Scoring recorded_scoring(const FinishedRun& run) {
+  const bool was_scored = run.record && run.record->score;
+  return {run.truth, was_scored ? run.record->score->options : EvaluationOptions{}};
+}
+
 MatchList match_list(const std::vector<Detection>& detections) {
   MatchList list;
   list.times_s.reserve(detections.size());

@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
+import inspect
 import json
+import re
 
 import numpy as np
 import pytest
@@ -209,7 +211,47 @@ def test_frames_that_nobody_knows():
         loopbit.GroundTruth([], every=0)
 
 
+# Flags of 'loopbit run' that run_folder() has by another name, or not at all.
+RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views": "views",
+           "truth_variable": "variable", "poses": "positions_m", "no_report": "evidence"}
+OF_OPTIONS = {"preset", "config", "set"}
+OF_SOURCE = {"every", "limit", "max_megapixels"}
+OF_THE_COMMAND = {"help", "threads", "pictures_mb"}
+
+
+def test_run_folder_has_what_the_command_has(command):
+    flags = {name.replace("-", "_") for name in
+             re.findall(r"^ +(?:-\w,)?--([\w-]+)", command("run", "--help"), re.MULTILINE)}
+    assert {"out", "map_cache_mb"} < flags
+    assert OF_SOURCE <= flags and OF_OPTIONS <= flags and OF_THE_COMMAND <= flags
+    expected = {RENAMED.get(flag, flag) for flag in flags - OF_OPTIONS - OF_SOURCE - OF_THE_COMMAND}
+    parameters = set(inspect.signature(loopbit.run_folder).parameters)
+    assert parameters - {"source", "options", "on_bad_frame"} == expected
+    scoring = expected & set(inspect.signature(loopbit.evaluate).parameters)
+    assert scoring == {"truth", "protocol", "tolerance_frames", "poses", "views", "variable",
+                       "not_false", "ignore"}
+
+
+def test_run_folder_scores_by_files_as_the_command_does(command, dataset, tmp_path):
+    (tmp_path / "ignore.csv").write_text("100\n")
+    command("run", dataset / "images", "--out", tmp_path / "cpp", "--truth", dataset / "truth.csv",
+            "--not-false", dataset / "not_false.csv", "--ignore", tmp_path / "ignore.csv",
+            "--tolerance", 2, "--no-report", "--map", tmp_path / "cpp.db", "--map-cache-mb", 1)
+    given = {"truth": dataset / "truth.csv", "not_false": dataset / "not_false.csv",
+             "ignore": tmp_path / "ignore.csv", "tolerance_frames": 2}
+    ours = loopbit.run_folder(dataset / "images", tmp_path / "python", evidence=False,
+                              map=tmp_path / "python.db", map_cache_mb=1, **given)
+    for name in ("truth.csv", "not_false.csv", "ignore.csv"):
+        ours_bytes = (tmp_path / "python" / name).read_bytes()
+        assert ours_bytes == (tmp_path / "cpp" / name).read_bytes(), name
+    theirs = json.loads((tmp_path / "cpp" / "run.json").read_text())
+    assert json.loads(ours.record_json)["score"] == theirs["score"]
+    assert loopbit.evaluate(ours, **given).to_json() == loopbit.evaluate(ours).to_json()
+
+
 BAD_ARGUMENTS = [
+    ({"ignore": "ignore.csv"}, loopbit.OptionError, "ignore applies to .* give truth"),
+    ({"tolerance_frames": -1}, loopbit.OptionError, "tolerance_frames is -1"),
     ({"keep_images": True, "map": None}, loopbit.OptionError, "keep_images .* give map"),
     ({"protocol": "kitti"}, loopbit.OptionError, "give truth"),
     ({"protocol": "nobody", "truth": "truth.csv"}, loopbit.OptionError, "no protocol 'nobody'"),
@@ -343,7 +385,7 @@ def test_bad_evaluations(run, dataset):
         loopbit.evaluate(run, protocol="nobody")
     with pytest.raises(ValueError, match="fixes it"):
         loopbit.evaluate(run, protocol="kitti", tolerance_frames=1)
-    with pytest.raises(ValueError, match="fixes them"):
+    with pytest.raises(ValueError, match="views cannot be given .* fixes it"):
         loopbit.read_truth(dataset / "poses.txt", protocol="kitti", views=2)
     with pytest.raises(loopbit.OptionError, match="as the path"):
         loopbit.evaluate(run, protocol="kitti")

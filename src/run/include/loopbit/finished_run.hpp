@@ -12,6 +12,7 @@
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/match_list.hpp"
 #include "loopbit/run_record.hpp"
+#include "loopbit/scoring.hpp"
 
 namespace loopbit {
 
@@ -30,6 +31,12 @@ struct FinishedRun {
 /// Reads a run folder, also of an interrupted run. Throws Error (kind input) if `path` has no run
 /// or one of its files is malformed.
 FinishedRun read_run(const std::string& path);
+
+/// The frames of `run`, with their times.
+FramesRead frames_read(const FinishedRun& run);
+
+/// The truth that `run` was given, and how it was scored.
+Scoring recorded_scoring(const FinishedRun& run);
 
 /// Reads the rows of a loops.csv. A last row without a line end was cut off and is dropped. Throws
 /// Error (kind input) with file and line.
