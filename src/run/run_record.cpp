@@ -26,6 +26,8 @@ using Json = nlohmann::ordered_json;
 /// Writes values to JSON. The place of a value is like "/input/every".
 class Writer {
  public:
+  explicit Writer(Json& json) : json_(json) {}
+
   template <typename Value>
   void operator()(const std::string& place, const Value& value, double /*min*/ = 0,
                   double /*max*/ = 0) {
@@ -39,10 +41,8 @@ class Writer {
     if (value != usual) (*this)(place, value);
   }
 
-  [[nodiscard]] Json& json() { return json_; }
-
  private:
-  Json json_;
+  Json& json_;
 };
 
 /// Reads values from JSON. Those that are missing or null stay as they are.
@@ -221,11 +221,12 @@ double peak_memory_mib() {
 }  // namespace
 
 std::string to_json(const RunRecord& record) {
-  Writer writer;
+  Json json;
+  Writer writer(json);
   transfer(writer, record);
-  if (record.score) writer.json()["score"] = Json::parse(to_json(*record.score, false));
+  if (record.score) json["score"] = Json::parse(to_json(*record.score, false));
   // A path need not be UTF-8, which JSON is.
-  return writer.json().dump(2, ' ', false, Json::error_handler_t::replace);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 RunRecord run_record_from_json(const std::string& json, const std::string& file) {

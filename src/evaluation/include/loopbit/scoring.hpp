@@ -81,7 +81,7 @@ struct ScoringRequest {
   [[nodiscard]] TruthOptions truth_options() const;
   [[nodiscard]] EvaluationOptions evaluation() const;
   [[nodiscard]] GroundTruth read(const FramesRead& frames) const;
-  void add_others(GroundTruth& truth) const;
+  void add_others(GroundTruth& result) const;
 };
 
 }  // namespace loopbit
