@@ -370,13 +370,19 @@ class EvaluationCommandTest(CommandTest):
         self.assert_fails(loopbit("compare", *runs, "--truth", self.dataset / "truth.csv"), 3,
                           "one frame in 2", "all frames")
 
-    def test_a_changed_record_is_named_or_passed_over(self):
+    def test_a_changed_record_is_named(self):
         folder = self.scratch / "run"
         shutil.copytree(self.reference, folder)
-        for record in ('{"score": null}', '{"score": []}', '{"score": {"tolerance_frames": "x"}}',
-                       '{"input": "x"}', '{"score": {"protocol": "of old"}}'):
-            (folder / "run.json").write_text(record)
-            self.assertEqual(loopbit("eval", folder).returncode, 0, record)
+        whole = json.loads((folder / "run.json").read_text())
+        for part in ({"score": None}, {"score": {"protocol": "of old"}}, {"new": 1}):
+            (folder / "run.json").write_text(json.dumps({**whole, **part}))
+            self.assertEqual(loopbit("eval", folder).returncode, 0, part)
+        for part, key in (({"score": []}, "score"), ({"input": "x"}, "input"),
+                          ({"score": {"tolerance_frames": "x"}}, "score.tolerance_frames")):
+            (folder / "run.json").write_text(json.dumps({**whole, **part}))
+            for command in ("eval", "report"):
+                self.assert_fails(loopbit(command, folder), 3, folder / "run.json", f"'{key}'")
+            self.assert_fails(loopbit("compare", folder, folder), 3, folder / "run.json", f"'{key}'")
         (folder / "run.json").write_text('{"score"')
         self.assert_fails(loopbit("eval", folder), 3, folder, "run.json")
 

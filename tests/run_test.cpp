@@ -106,6 +106,80 @@ std::vector<Detection> four_detections() {
           {.frame = 3, .status = Status::no_geometry, .match = 1, .score = 0.0, .matches = 9}};
 }
 
+/// A record of which no value is the default.
+RunRecord full_record() {
+  RunRecord record{.input = "images",
+                   .description = "a folder",
+                   .options = {},
+                   .every = 4,
+                   .views = 2,
+                   .limit = 9,
+                   .threads = 3,
+                   .map_session = 5,
+                   .map_path = "town.db",
+                   .stopped_by = "interrupt",
+                   .wall_s = 1.5,
+                   .arguments = {"run", "images"},
+                   .early_end = "The video is cut off.",
+                   .truth = "truth.csv",
+                   .truth_every = 2,
+                   .machine = {"a processor", 7, "avx2", "Linux"},
+                   .results = run_results(four_detections(), 1.5)};
+  record.options.surf.max_keypoints = 77;
+  record.options.surf.upright = false;
+  const GroundTruth truth{.same_place = {{1, 0, 0}, {3, 0, 0}}};
+  record.score = evaluate(match_list(four_detections()), truth, {2, "of old"});
+  return record;
+}
+
+TEST(RunRecord, WhatWasWrittenIsRead) {
+  for (const RunRecord& record : {RunRecord{}, stopped_by(kRunning), full_record()}) {
+    const std::string json = to_json(record);
+    EXPECT_EQ(to_json(run_record_from_json(json, "run.json")), json);
+  }
+  const RunRecord read = run_record_from_json(to_json(full_record()), "run.json");
+  EXPECT_EQ(read.views, 2);
+  EXPECT_FALSE(read.options.surf.upright);
+  EXPECT_EQ(read.score->options.protocol, "of old");
+  EXPECT_EQ(read.results->frames, 4);
+}
+
+TEST(RunRecord, ReadsAnotherVersion) {
+  const RunRecord read = run_record_from_json(
+      R"({"loopbit": "0.0.1", "options": {"of_old": {"a": 1}}, "input": {"every": 3}, "x": []})",
+      "run.json");
+  EXPECT_EQ(read.version, "0.0.1");
+  EXPECT_EQ(read.every, 3);
+  EXPECT_EQ(read.views, 1);
+  EXPECT_FALSE(read.score || read.results);
+}
+
+TEST(RunRecord, ADamagedFileIsRefusedWithKeyAndValue) {
+  const auto refuses = [](const std::string& json, std::initializer_list<std::string_view> words) {
+    SCOPED_TRACE(json);
+    test::expect_error(ErrorKind::input, words,
+                       [&] { (void)run_record_from_json(json, "old/run.json"); });
+  };
+  refuses("{\"score\"", {"'old/run.json'", "is not a JSON object", "run again"});
+  refuses("[1]", {"is not a JSON object"});
+  refuses("{}", {"has no 'loopbit'"});
+  refuses(R"({"loopbit": "1"})", {"has no 'options'"});
+  const auto with = [](const std::string& rest) {
+    return R"({"loopbit": "1", "options": {}, )" + rest + "}";
+  };
+  refuses(with(R"("threads": "x")"), {"'old/run.json' has \"x\" for 'threads'", "delete"});
+  refuses(with(R"("threads": 1.5)"), {"has 1.5 for 'threads'"});
+  refuses(with(R"("threads": 99999999999)"), {"has 99999999999 for 'threads'"});
+  refuses(with(R"("input": {"every": 0})"), {"has 0 for 'input.every'"});
+  refuses(with(R"("input": [2])"), {"has an array for 'input'"});
+  refuses(with(R"("score": {"tolerance_frames": -1})"), {"has -1 for 'score.tolerance_frames'"});
+  refuses(with(R"("arguments": [1])"), {"has an array for 'arguments'"});
+  refuses(R"({"loopbit": "1", "options": {"surf": {"upright": 1}}})",
+          {"1 for 'options.surf.upright'"});
+  refuses(with(R"("truth": )" + std::string(100'000, '[') + std::string(100'000, ']')),
+          {"has an array for 'truth'"});
+}
+
 TEST_F(RunFolderTest, WhatWasWrittenIsRead) {
   const GroundTruth truth{{{1, 0, 0}, {3, 0, 1}}, {{3, 0, 2}}, {2}, {0}};
   const std::vector<std::optional<cv::Vec3d>> positions{cv::Vec3d(0.5, -2.0, 1e3), std::nullopt,

@@ -13,7 +13,7 @@ import numpy
 import numpy.typing
 
 from loopbit import _loopbit
-from loopbit._evaluating import Path, check_kind, check_value, read_truth, recorded_scoring
+from loopbit._evaluating import Path, request
 from loopbit._loopbit import (
     Detection,
     FinishedRun,
@@ -21,7 +21,7 @@ from loopbit._loopbit import (
     ImageSource,
     LoopDetector,
     LoopDetectorOptions,
-    TruthKind,
+    PoseTruthOptions,
 )
 
 _DETECTION = numpy.dtype(
@@ -110,8 +110,15 @@ def run_folder(
     map: Path | None = None,
     truth: GroundTruth | Path | None = None,
     protocol: str = "",
+    tolerance_frames: int | None = None,
+    poses: PoseTruthOptions | None = None,
+    variable: str = "",
+    views: int | None = None,
+    not_false: Path | None = None,
+    ignore: Path | None = None,
     positions_m: numpy.typing.ArrayLike | Path | None = None,
     keep_images: bool = False,
+    map_cache_mb: int | None = None,
     overwrite: bool = False,
     evidence: bool = True,
     on_bad_frame: Callable[[str], None] = warnings.warn,
@@ -124,8 +131,11 @@ def run_folder(
     map: a map that the run continues with a new session, or creates. Places of earlier sessions are
     recognised.
     keep_images: stores a small JPEG of each place in the map.
+    map_cache_mb: up to this many MiB of the map's features stay in memory; as in MapWriter without
+    it. Changes no result.
     truth: the path of a file, or a GroundTruth for the frames that are read. A protocol requires
-    the path.
+    the path. For protocol, tolerance_frames, poses, variable, views, not_false and ignore see
+    evaluate().
     positions_m: camera centres, one per frame read, nan if unknown; or a file of poses. A truth
     file of poses also provides them.
     Files count all frames of the sequence, whatever part of it is read.
@@ -137,17 +147,18 @@ def run_folder(
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)
     every, frames = source.every, _loopbit._frames_left(source)
-    is_whole = frames is not None and _loopbit._limit(source) == 0
-    _check_from_start(source, truth=truth, positions_m=positions_m)
+    _check_from_start(source, truth=truth, not_false=not_false, ignore=ignore,
+                      positions_m=positions_m)
     if keep_images and not map:
         raise _loopbit.OptionError("keep_images stores images in a map; give map, or leave it out.")
     if not callable(on_bad_frame):
         raise TypeError(f"on_bad_frame is {on_bad_frame!r}, but must be callable.")
-    _check_truth(truth, protocol, every, frames, is_whole)
-    tolerance = _loopbit.find_protocol(protocol).tolerance_frames if protocol else 0
-    if positions_m is None and isinstance(truth, (str, os.PathLike)):
-        if _loopbit.truth_kind(truth) == TruthKind.poses:
-            positions_m = truth
+    scoring, known = request(truth, protocol=protocol, tolerance_frames=tolerance_frames,
+                             poses=poses, variable=variable, views=views, not_false=not_false,
+                             ignore=ignore)
+    scoring.check(every, frames, frames is not None and _loopbit._limit(source) == 0)
+    if positions_m is None:
+        positions_m = scoring.poses_file() or None
     if isinstance(positions_m, (str, os.PathLike)):
         _loopbit._check_poses(positions_m, frames, every, False)
     elif positions_m is not None:
@@ -160,7 +171,8 @@ def run_folder(
         map or "",
         overwrite,
         keep_images,
-        truth if isinstance(truth, (str, os.PathLike)) else "",
+        map_cache_mb,
+        scoring,
         positions_m if isinstance(positions_m, (str, os.PathLike)) else "",
     )
     stopped_by = "end"
@@ -172,13 +184,7 @@ def run_folder(
     else:
         times_s = recorded.times_s
         try:
-            if isinstance(truth, (str, os.PathLike)):
-                all_read = is_whole and len(times_s) == frames
-                truth = read_truth(
-                    truth, protocol=protocol, every=every, times_s=times_s, all_read=all_read
-                )
-            if truth is not None:
-                recorded.score(truth, tolerance, protocol)
+            recorded.score(scoring, known, frames)
         finally:
             if isinstance(positions_m, (str, os.PathLike)):
                 positions_m = _loopbit.read_positions(positions_m, times_s, every)
@@ -188,32 +194,6 @@ def run_folder(
     finally:
         recorded.finish(stopped_by)
     return _loopbit.read_run(recorded.path)
-
-
-def _check_truth(
-    truth: GroundTruth | Path | None,
-    protocol: str,
-    every: int,
-    frames: int | None,
-    is_whole: bool,
-) -> None:
-    """Raises the errors of reading truth that can be found before the frames are read."""
-    if truth is None:
-        if protocol:
-            raise _loopbit.OptionError(
-                f"protocol '{protocol}' applies to truth; give truth, or leave out the protocol."
-            )
-    elif isinstance(truth, GroundTruth):
-        check_value(protocol)
-    elif not isinstance(truth, (str, os.PathLike)):
-        raise TypeError(f"truth is {truth!r}, but must be a GroundTruth or a path.")
-    elif _loopbit.truth_kind(truth) == TruthKind.poses:
-        if protocol:
-            check_kind(protocol, truth)
-        _loopbit._check_poses(truth, frames, every, is_whole)
-    else:
-        times_s = [None] * (frames or 0)
-        read_truth(truth, protocol=protocol, every=every, times_s=times_s, all_read=is_whole)
 
 
 def _check_positions(positions_m: numpy.typing.NDArray[Any], frames: int | None) -> None:
@@ -237,5 +217,5 @@ def write_report(run: FinishedRun | Path, path: Path | None = None) -> str:
         run = _loopbit.read_run(run)
     path = os.path.join(run.path, "report.html") if path is None else os.fspath(path)
     name = os.path.basename(os.path.normpath(run.path))
-    _loopbit._write_report(run, name, path, *recorded_scoring(run))
+    _loopbit._write_report(run, name, path)
     return path

@@ -182,12 +182,6 @@ void bind_truth(py::module_& module) {
 }
 
 /// To be called with the GIL, which is free meanwhile.
-std::vector<PlaceRun> place_runs_of(const std::string& path) {
-  const WithoutGil release;
-  return read_place_runs(path);
-}
-
-/// As place_runs_of().
 Positions read_without_gil(const std::string& path, const Times& times_s, int every) {
   const WithoutGil release;
   return read_positions(path, times_s, every);
@@ -223,20 +217,6 @@ void bind_data(py::module_& module) {
   module.def(
       "truth_kind", [](const Path& path) { return truth_kind(path.string()); }, py::arg("path"),
       Free(), "The kind of a file of ground truth.");
-  module.def(
-      "_read_truth",
-      [](const Path& path, const PoseTruthOptions& poses, const std::string& variable, int views,
-         int every, const Times& times_s, bool all_read) {
-        return read_truth(path.string(), {poses, variable, views, every, all_read}, times_s);
-      },
-      py::arg("path"), py::arg("poses"), py::arg("variable"), whole("views"), whole("every"),
-      py::arg("times_s"), py::arg("all_read"), Free());
-  module.def(
-      "_read_place_runs", [](const Path& path) { return take(place_runs_of(path.string())); },
-      py::arg("path"));
-  module.def(
-      "_read_frame_list", [](const Path& path) { return read_frame_list(path.string()); },
-      py::arg("path"), Free());
   module.def("every_nth", &every_nth, py::arg("truth"), whole("every"), Free(),
              "The ground truth of every N-th frame, numbered by the frames that were read.");
 }

@@ -11,6 +11,7 @@
 #include "loopbit/evaluation.hpp"
 #include "loopbit/match_list.hpp"
 #include "loopbit/protocol.hpp"
+#include "loopbit/scoring.hpp"
 
 #include "bindings.hpp"
 #include "numpy_columns.hpp"
@@ -174,6 +175,39 @@ void bind_protocols(py::module_& module) {
              "The protocol with this name. Raises OptionError if there is none.");
 }
 
+/// For the functions of the package that score. They have keywords of the same names.
+void bind_scoring(py::module_& module) {
+  using File = std::filesystem::path;
+  using Released = py::call_guard<WithoutGil>;
+  py::class_<ScoringRequest>(module, "_ScoringRequest")
+      .def(py::init([](const File& truth, const File& not_false, const File& ignore,
+                       const std::string& protocol, std::optional<int> tolerance_frames,
+                       const std::optional<PoseTruthOptions>& poses, std::optional<int> views,
+                       const std::string& variable) {
+             return ScoringRequest{truth.string(),
+                                   not_false.string(),
+                                   ignore.string(),
+                                   protocol,
+                                   tolerance_frames,
+                                   poses,
+                                   views,
+                                   variable};
+           }),
+           py::kw_only(), py::arg("truth") = "", py::arg("not_false") = "", py::arg("ignore") = "",
+           py::arg("protocol") = "", whole("tolerance_frames") = py::none(),
+           py::arg("poses") = py::none(), whole("views") = py::none(), py::arg("variable") = "")
+      .def("check", &ScoringRequest::check, whole("every"), whole("frames"), py::arg("all_read"),
+           Released())
+      .def(
+          "read_truth",
+          [](const ScoringRequest& self, int every, FrameTimes times_s, bool all_read) {
+            check_every(every);
+            return self.resolve({every, 1, std::move(times_s), all_read}).truth;
+          },
+          whole("every"), py::arg("times_s"), py::arg("all_read"), Released())
+      .def("poses_file", &ScoringRequest::poses_file, Released());
+}
+
 }  // namespace
 
 void bind_evaluation(py::module_& module) {
@@ -183,14 +217,7 @@ void bind_evaluation(py::module_& module) {
   bind_counts(module);
   bind_result(module);
   bind_protocols(module);
-  module.def(
-      "_evaluate",
-      [](const MatchList& list, const GroundTruth& truth, int tolerance_frames,
-         const std::string& protocol) {
-        return evaluate(list, truth, {tolerance_frames, protocol});
-      },
-      py::arg("matches"), py::arg("truth"), whole("tolerance_frames"), py::arg("protocol"),
-      py::call_guard<WithoutGil>());
+  bind_scoring(module);
 }
 
 }  // namespace loopbit::python

@@ -15,15 +15,14 @@ namespace {
 namespace py = pybind11;
 
 void write_run_report(const FinishedRun& run, const std::filesystem::path& name,
-                      const std::filesystem::path& path, int tolerance_frames,
-                      const std::string& protocol) {
+                      const std::filesystem::path& path) {
   ReportRun column;
   column.name = name.string();
   column.list = match_list(run.detections);
   column.run = run;
   column.positions_m = run.positions_m;
   column.truth = run.truth;
-  column.evaluation = {tolerance_frames, protocol};
+  column.evaluation = recorded_scoring(run).evaluation;
   write_report(path.string(), {column});
 }
 
@@ -31,7 +30,7 @@ void write_run_report(const FinishedRun& run, const std::filesystem::path& name,
 
 void bind_report(py::module_& module) {
   module.def("_write_report", &write_run_report, py::arg("run"), py::arg("name"), py::arg("path"),
-             whole("tolerance_frames"), py::arg("protocol"), py::call_guard<WithoutGil>());
+             py::call_guard<WithoutGil>());
 }
 
 }  // namespace loopbit::python

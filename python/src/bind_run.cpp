@@ -109,6 +109,43 @@ RunRecord record_of(const SharedSource& source, const LoopDetectorOptions& optio
           .truth = truth};
 }
 
+std::unique_ptr<RecordedRun> record_run(SharedSource& source, const Path& out,
+                                        const LoopDetectorOptions& options, const Path& map,
+                                        bool overwrite, bool keep_images,
+                                        std::optional<std::size_t> map_cache_mb,
+                                        const ScoringRequest& scoring, const Path& poses) {
+  if (overwrite || options.exclusion.seconds > 0) source.prove(options);
+  return std::make_unique<RecordedRun>(
+      record_of(source, options, map.string(), scoring.truth),
+      RunOutput{.folder = out.string(),
+                .overwrite = overwrite,
+                .keep_images = keep_images,
+                .map_cache_mb = map_cache_mb.value_or(kMapCache_mb),
+                .inputs = {source.input(), scoring.truth, scoring.not_false, scoring.ignore,
+                           poses.string()}});
+}
+
+/// Scores by the request, or by `known` truth. `frames`: see SharedSource::frames_left().
+void score(RecordedRun& recorded, const ScoringRequest& request,
+           const std::optional<GroundTruth>& known, std::optional<std::size_t> frames) {
+  const RunRecord& record = recorded.record();
+  FrameTimes times_s = match_list(recorded.folder().detections()).times_s;
+  const bool all = record.limit == 0 && frames == times_s.size();
+  const auto [truth, evaluation] =
+      request.resolve({record.every, record.views, std::move(times_s), all}, {known, {}});
+  if (truth) recorded.score(*truth, evaluation);
+}
+
+Evaluation evaluate_found(const MatchList& matches, const FinishedRun* run,
+                          const std::optional<GroundTruth>& known, const ScoringRequest& request) {
+  const FramesRead frames = run ? frames_read(*run) : FramesRead{.times_s = matches.times_s};
+  const bool is_recorded = run && !known;
+  const auto [truth, evaluation] =
+      request.resolve(frames, is_recorded ? recorded_scoring(*run) : Scoring{known, {}});
+  if (truth) return evaluate(matches, *truth, evaluation);
+  throw Error(ErrorKind::option, "There is no ground truth; give truth.");
+}
+
 void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_bad_frame,
             bool keep_evidence) {
   const RunListener listener{
@@ -134,32 +171,16 @@ void keep_positions(RecordedRun& recorded, const PositionRows& positions_m) {
 /// For run_folder() of the package, which uses RecordedRun like the command.
 void bind_recorded_run(py::module_& module) {
   py::class_<RecordedRun>(module, "_RecordedRun")
-      .def(py::init([](SharedSource& source, const Path& out, const LoopDetectorOptions& options,
-                       const Path& map, bool overwrite, bool keep_images, const Path& truth,
-                       const Path& poses) {
-             if (overwrite || options.exclusion.seconds > 0) source.prove(options);
-             return std::make_unique<RecordedRun>(
-                 record_of(source, options, map.string(), truth.string()),
-                 RunOutput{.folder = out.string(),
-                           .overwrite = overwrite,
-                           .keep_images = keep_images,
-                           .inputs = {source.input(), truth.string(), poses.string()}});
-           }),
-           py::arg("source"), py::arg("out"), py::arg("options"), py::arg("map"),
-           py::arg("overwrite"), py::arg("keep_images"), py::arg("truth"), py::arg("poses"), Free())
+      .def(py::init(&record_run), py::arg("source"), py::arg("out"), py::arg("options"),
+           py::arg("map"), py::arg("overwrite"), py::arg("keep_images"), whole("map_cache_mb"),
+           py::arg("scoring"), py::arg("poses"), Free())
       .def("detect", &detect, py::arg("source"), py::arg("on_bad_frame"), py::arg("evidence"))
       .def_property_readonly("path",
                              [](const RecordedRun& self) { return Text{self.folder().path()}; })
       .def_property_readonly(
           "times_s",
           [](const RecordedRun& self) { return match_list(self.folder().detections()).times_s; })
-      .def(
-          "score",
-          [](RecordedRun& self, const GroundTruth& truth, int tolerance_frames,
-             const std::string& protocol) {
-            self.score(truth, {tolerance_frames, protocol});
-          },
-          py::arg("truth"), whole("tolerance_frames"), py::arg("protocol"), Free())
+      .def("score", &score, py::arg("scoring"), py::arg("known"), whole("frames"), Free())
       .def("keep_positions", &keep_positions, py::arg("positions_m"))
       .def("finish", &RecordedRun::finish, py::arg("stopped_by"), Free());
 }
@@ -205,6 +226,8 @@ void bind_run(py::module_& module) {
   module.def("_run", &run_source, py::arg("source"), py::arg("detector"), py::arg("on_detection"),
              py::arg("on_bad_frame"));
   bind_recorded_run(module);
+  module.def("_evaluate", &evaluate_found, py::arg("matches"), py::arg("run"), py::arg("known"),
+             py::arg("scoring"), Free());
 }
 
 }  // namespace loopbit::python

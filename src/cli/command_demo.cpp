@@ -86,13 +86,12 @@ int demo_command(const DemoFlags& flags, const Arguments& arguments) {
   session.input = "demo";
   session.arguments = arguments;
   session.truth_files = flags.truth.files();
-  session.truth_description =
-      flags.truth.given() ? flags.truth.description() : "exact (built-in world)";
-  session.evaluation = flags.truth.evaluation();
-  session.truth = [&](const FrameTimes& times_s) {
+  const std::string description = flags.truth.scoring.description();
+  session.truth_description = description.empty() ? "exact (built-in world)" : description;
+  session.scoring = [&](const FrameTimes& times_s) {
     const GroundTruth built_in{.same_place = world->same_place(),
                                .near_place = world->near_place()};
-    return flags.truth.read_truth(times_s, 1).value_or(built_in);
+    return flags.truth.scoring.resolve({.times_s = times_s}, {.truth = built_in});
   };
   session.positions = [&](const FrameTimes& times_s) { return positions(*world, times_s.size()); };
   return run_session(std::move(session), flags.session);

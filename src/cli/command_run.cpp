@@ -31,17 +31,17 @@ int run_command(const RunFlags& flags, const Arguments& arguments) {
   const std::optional<std::size_t> frames = exact_size(*session.source, flags.input);
   const bool is_whole = frames && flags.limit == 0;
   flags.truth.check(flags.every, frames, is_whole);
-  session.evaluation = flags.truth.evaluation();
-  session.truth = [&, frames, is_whole](const FrameTimes& times_s) {
-    return flags.truth.read_truth(times_s, flags.every, is_whole && times_s.size() == *frames);
+  session.scoring = [&, frames, is_whole](const FrameTimes& times_s) {
+    const bool all = is_whole && times_s.size() == *frames;
+    return flags.truth.scoring.resolve({.every = flags.every, .times_s = times_s, .all = all});
   };
   session.positions = [&](const FrameTimes& times_s) {
-    return flags.truth.read_positions(times_s, flags.every);
+    return flags.truth.read_positions({.every = flags.every, .times_s = times_s});
   };
   session.input = flags.input;
   session.arguments = arguments;
   session.truth_files = flags.truth.files();
-  session.truth_description = flags.truth.description();
+  session.truth_description = flags.truth.scoring.description();
   session.every = flags.every;
   session.limit = flags.limit;
   return run_session(std::move(session), flags.session);

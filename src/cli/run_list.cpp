@@ -9,7 +9,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "loopbit/error.hpp"
 
@@ -45,29 +44,6 @@ std::pair<std::string, std::string> name_and_path(const std::string& text) {
   return {is_folder(run) ? last.filename().string() : last.stem().string(), run};
 }
 
-using Json = nlohmann::ordered_json;
-
-/// Throws Error where the record of a run is none.
-Json record_of(const FinishedRun& run) {
-  if (run.record_json.empty()) return Json::object();
-  Json record = Json::parse(run.record_json, nullptr, false);
-  if (record.is_object()) return record;
-  throw Error(ErrorKind::input, fmt::format("The run.json in '{}' is not a record of a run: it was "
-                                            "changed after loopbit wrote it; run again.",
-                                            run.path));
-}
-
-/// What stands at `path` in a record, such as "/input/every"; `otherwise` where nothing of that
-/// type does.
-template <typename Value>
-Value value_at(const Json& record, const char* path, Value otherwise) {
-  try {
-    return record.value(Json::json_pointer(path), otherwise);
-  } catch (const Json::exception&) {
-    return otherwise;
-  }
-}
-
 }  // namespace
 
 ListedRun listed_run(const std::string& text) {
@@ -80,29 +56,22 @@ ListedRun listed_run(const std::string& text) {
     run.list = match_list(run.run->detections);
     run.truth = run.run->truth;
     run.positions_m = run.run->positions_m;
-    const Json record = record_of(*run.run);
-    run.evaluation.tolerance_frames = value_at(record, "/score/tolerance_frames", 0);
-    run.evaluation.protocol = value_at(record, "/score/protocol", std::string());
-    listed.frames.every = std::max(1, value_at(record, "/input/every", 1));
-    listed.frames.views = std::max(1, value_at(record, "/input/views", 1));
-    listed.frames.all = value_at(record, "/stopped_by", std::string()) == "end" &&
-                        value_at(record, "/input/limit", 1) == 0;
+    run.evaluation = recorded_scoring(*run.run).evaluation;
+    listed.frames = frames_read(*run.run);
   } else {
     run.list = read_match_list(path);
+    listed.frames.times_s = run.list.times_s;
   }
-  listed.frames.times_s = run.list.times_s;
   return listed;
 }
 
 void take_truth(ReportRun& run, const TruthFlags& flags, const FramesRead& frames) {
-  const int every = frames.every_counted();
-  if (auto positions = flags.read_positions(frames.times_s, every); !positions.empty()) {
+  if (auto positions = flags.read_positions(frames); !positions.empty()) {
     run.positions_m = std::move(positions);
   }
-  if (flags.given()) {
-    run.truth = flags.read_truth(frames.times_s, every, frames.all);
-    run.evaluation = flags.evaluation();
-  }
+  auto [truth, evaluation] = flags.scoring.resolve(frames, {run.truth, run.evaluation});
+  run.truth = std::move(truth);
+  run.evaluation = std::move(evaluation);
 }
 
 ReportRun report_run(const std::string& text, const TruthFlags& flags) {

@@ -12,17 +12,6 @@
 
 namespace loopbit::cli {
 
-/// What was read of a sequence of images, where it is known.
-struct FramesRead {
-  int every = 1;       ///< of the input's frames
-  int views = 1;       ///< see RunRecord::views
-  FrameTimes times_s;  ///< one a frame; empty of a detector that lists matches only
-  bool all = false;    ///< see TruthOptions::all_read
-
-  /// Of the frames that files of truth count.
-  [[nodiscard]] int every_counted() const { return std::max(1, every / views); }
-};
-
 /// A run, and the frames that it is about.
 struct ListedRun {
   ReportRun run;

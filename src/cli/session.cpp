@@ -57,7 +57,8 @@ std::optional<Error> score(const Session& session, RecordedRun& recorded) {
     }
   };
   attempt([&] {
-    if (const auto truth = session.truth(times_s)) recorded.score(*truth, session.evaluation);
+    const auto [truth, evaluation] = session.scoring(times_s);
+    if (truth) recorded.score(*truth, evaluation);
   });
   attempt([&] {
     const auto positions = session.positions(times_s);

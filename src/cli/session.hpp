@@ -51,9 +51,8 @@ struct Session {
   int every = 1;
   int limit = 0;
   // Asked with the frames' times when the run is over.
-  std::function<std::optional<GroundTruth>(const FrameTimes&)> truth;
+  std::function<Scoring(const FrameTimes&)> scoring;
   std::function<Positions(const FrameTimes&)> positions;
-  EvaluationOptions evaluation;
 };
 
 /// Adds the flag for ReportOptions to `command`.

@@ -274,19 +274,6 @@ Json matrix_json(const EvidenceReader& evidence, const MatchList& list, int fram
           {"png", report::base64(png)}};
 }
 
-/// The record, or null if the run was cut off.
-Json record_of(const ReportRun& run) {
-  if (!run.run || run.run->record_json.empty()) return nullptr;
-  Json record = Json::parse(run.run->record_json, nullptr, false);
-  if (!record.is_object() || !record.contains("options")) {
-    throw Error(ErrorKind::input,
-                fmt::format("The run.json in '{}' is not a record of a run: it was "
-                            "changed after loopbit wrote it; run again.",
-                            run.run->path));
-  }
-  return record;
-}
-
 bool is_same(const GroundTruth& a, const GroundTruth& b) {
   return a.every == b.every && a.same_place == b.same_place && a.near_place == b.near_place &&
          a.ignored == b.ignored && a.unknown == b.unknown;
@@ -296,8 +283,7 @@ bool is_same(const GroundTruth& a, const GroundTruth& b) {
 Json source_of(const GroundTruth& truth, const std::vector<ReportRun>& runs) {
   for (const ReportRun& run : runs) {
     if (!run.run || !run.run->truth || !is_same(truth, *run.run->truth)) continue;
-    const Json record = record_of(run);
-    if (record.is_object() && record.contains("truth")) return record["truth"];
+    if (run.run->record && !run.run->record->truth.empty()) return run.run->record->truth;
   }
   return nullptr;
 }
@@ -307,10 +293,10 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
   const auto truth =
       run.truth ? std::optional(every_nth(*run.truth, run.truth->every)) : std::nullopt;
   const auto [frames, is_known] = frame_count(run, truth, runs);
-  const Json record = record_of(run);
+  const bool has_record = run.run && run.run->record;  // unless it was cut off
   const std::vector<FrameView> views = frame_views(run, truth, frames);
   Json json{{"name", run.name},
-            {"record", record},
+            {"record", has_record ? Json::parse(run.run->record_json) : Json()},
             {"threshold", nullptr},
             {"frames", frames},
             {"frames_known", is_known}};
@@ -330,8 +316,8 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
   if (!run.run) return json;
 
   LoopDetectorOptions options;
-  if (!record.is_null()) {
-    options = options_from_json(record["options"].dump(), run.run->path + "/run.json");
+  if (has_record) {
+    options = run.run->record->options;
     json["threshold"] = options.decision.min_score;
   }
   add_own_columns(json, run.run->detections);

@@ -2,15 +2,15 @@
 // SPDX-License-Identifier: MIT
 #include "earlier_run.hpp"
 
-#include <fstream>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "loopbit/database.hpp"
 #include "loopbit/error.hpp"
+#include "loopbit/read_file.hpp"
+#include "loopbit/run_record.hpp"
 
 #include "run_files.hpp"
 
@@ -71,11 +71,12 @@ void check_replaceable(const fs::path& folder, const std::vector<fs::path>& file
 
 /// Whether the run in `folder` came to its end, which an interrupt is, too.
 bool has_ended(const fs::path& folder) {
-  std::ifstream file(folder / kRecordFile);
-  const auto record = nlohmann::json::parse(file, nullptr, false);
-  if (!record.is_object()) return false;
-  const auto stopped_by = record.find("stopped_by");
-  return stopped_by != record.end() && (*stopped_by == "end" || *stopped_by == "interrupt");
+  const std::string file = (folder / kRecordFile).string();
+  try {
+    return run_record_from_json(read_text(file), file).has_ended();
+  } catch (const Error&) {  // no record
+    return false;
+  }
 }
 
 /// Removes the files of a run.

@@ -11,7 +11,6 @@
 #include <type_traits>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "loopbit/error.hpp"
 #include "loopbit/read_file.hpp"
@@ -154,14 +153,6 @@ std::vector<std::optional<cv::Vec3d>> read_positions(const std::string& path, st
   return positions;
 }
 
-/// What run.json says of the truth beside it; 1 where it says nothing.
-int truth_every(const std::string& record_json) {
-  const auto record = nlohmann::json::parse(record_json, nullptr, false);
-  if (!record.is_object()) return 1;
-  const auto every = record.find("truth_every");
-  return every != record.end() && every->is_number_integer() ? std::max(1, every->get<int>()) : 1;
-}
-
 }  // namespace
 
 std::vector<Detection> read_detections(const std::string& path) {
@@ -184,12 +175,16 @@ FinishedRun read_run(const std::string& path) {
   FinishedRun run;
   run.path = path;
   run.detections = read_detections((folder / kLoopsFile).string());
-  if (is_there(folder / kRecordFile)) run.record_json = read_text((folder / kRecordFile).string());
+  if (is_there(folder / kRecordFile)) {
+    const std::string file = (folder / kRecordFile).string();
+    run.record_json = read_text(file);
+    run.record = run_record_from_json(run.record_json, file);
+  }
   if (is_there(folder / kTruthFile)) {
     run.truth = {.same_place = read_place_runs((folder / kTruthFile).string()),
                  .near_place = read_place_runs((folder / kNotFalseFile).string()),
                  .ignored = read_frame_list((folder / kIgnoreFile).string()),
-                 .every = truth_every(run.record_json)};
+                 .every = run.record ? run.record->truth_every : 1};
     const fs::path unknown = folder / kUnknownFile;  // which earlier versions did not write
     if (is_there(unknown)) run.truth->unknown = read_frame_list(unknown.string());
   }
@@ -198,6 +193,21 @@ FinishedRun read_run(const std::string& path) {
   }
   if (is_there(folder / kEvidenceFile)) run.evidence_path = (folder / kEvidenceFile).string();
   return run;
+}
+
+FramesRead frames_read(const FinishedRun& run) {
+  FramesRead frames;
+  for (const Detection& detection : run.detections) frames.times_s.push_back(detection.timestamp_s);
+  if (!run.record) return frames;
+  frames.every = run.record->every;
+  frames.views = run.record->views;
+  frames.all = run.record->stopped_by == "end" && run.record->limit == 0;
+  return frames;
+}
+
+Scoring recorded_scoring(const FinishedRun& run) {
+  const bool was_scored = run.record && run.record->score;
+  return {run.truth, was_scored ? run.record->score->options : EvaluationOptions{}};
 }
 
 MatchList match_list(const std::vector<Detection>& detections) {

@@ -2,23 +2,15 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/run_folder.hpp"
 
-#include <algorithm>
 #include <cerrno>
-#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
-#include <thread>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
-#include <sys/resource.h>
-#include <sys/utsname.h>
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
-#include "loopbit/instruction_set.hpp"
-#include "loopbit/version.hpp"
 #include "loopbit/write_file.hpp"
 
 #include "earlier_run.hpp"
@@ -28,7 +20,6 @@ namespace loopbit {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 /// "17", or "2:17" for frame 17 of session 2 of the map.
 std::string match_cell(const Detection& d) {
@@ -44,85 +35,6 @@ std::string csv_row(const Detection& d) {
                      d.timestamp_s ? fmt::format("{:.6f}", *d.timestamp_s) : "",
                      to_string(d.status), match_cell(d), d.score, d.similarity, d.matches,
                      d.inliers, t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
-}
-
-std::string processor_name() {
-  std::ifstream info("/proc/cpuinfo");
-  for (std::string line; std::getline(info, line);) {
-    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
-  }
-  return "unknown";
-}
-
-Json machine() {
-  utsname system{};
-  uname(&system);
-  return {{"processor", processor_name()},
-          {"cores", std::thread::hardware_concurrency()},
-          {"kernel", to_string(active_instruction_set())},
-          {"system", fmt::format("{} {} {}", system.sysname, system.release, system.machine)}};
-}
-
-double peak_memory_mib() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  constexpr double kKibPerMib = 1024.0;
-  return static_cast<double>(usage.ru_maxrss) / kKibPerMib;
-}
-
-Json counts(const std::vector<Detection>& detections) {
-  Json by_status;
-  for (const Status status : kAllStatuses) {
-    by_status[std::string(to_string(status))] =
-        std::count_if(detections.begin(), detections.end(),
-                      [&](const Detection& d) { return d.status == status; });
-  }
-  return {{"frames", detections.size()}, {"by_status", by_status}};
-}
-
-Json to_json(const TimeSummary& times) {
-  return {{"mean", times.mean}, {"p50", times.p50}, {"p99", times.p99}, {"max", times.max}};
-}
-
-Json times(const std::vector<Detection>& detections) {
-  return {{"content", to_json(summarize(detections, &StepTimes::content_ms))},
-          {"retrieval", to_json(summarize(detections, &StepTimes::retrieval_ms))},
-          {"features", to_json(summarize(detections, &StepTimes::features_ms))},
-          {"verification", to_json(summarize(detections, &StepTimes::verification_ms))},
-          {"total", to_json(summarize(detections, total_ms))}};
-}
-
-void add_results(Json& json, const RunRecord& record, const std::vector<Detection>& detections) {
-  json["counts"] = counts(detections);
-  json["times_ms"] = times(detections);
-  json["wall_s"] = record.wall_s;
-  json["frames_per_s"] =
-      record.wall_s > 0 ? static_cast<double>(detections.size()) / record.wall_s : 0.0;
-  json["peak_memory_mib"] = peak_memory_mib();
-  if (record.score) json["score"] = Json::parse(to_json(*record.score, false));
-}
-
-Json to_json(const RunRecord& record, const std::vector<Detection>& detections) {
-  Json json{{"loopbit", kVersion},
-            {"arguments", record.arguments},
-            {"input",
-             {{"path", record.input},
-              {"description", record.description},
-              {"every", record.every},
-              {"limit", record.limit}}},
-            {"stopped_by", record.stopped_by},
-            {"options", Json::parse(loopbit::to_json(record.options))},
-            {"machine", machine()},
-            {"threads", record.threads}};
-  if (!record.map_path.empty()) {
-    json["map"] = {{"path", record.map_path}, {"session", record.map_session}};
-  }
-  if (!record.early_end.empty()) json["input"]["early_end"] = record.early_end;
-  if (record.views != 1) json["input"]["views"] = record.views;
-  if (!record.truth.empty()) json["truth"] = record.truth;
-  if (record.truth_every != 1) json["truth_every"] = record.truth_every;
-  if (record.stopped_by != kRunning) add_results(json, record, detections);
-  return json;
 }
 
 std::string frame_list(const char* comment, const std::vector<int>& frames) {
@@ -207,9 +119,10 @@ std::string RunFolder::evidence_path() const { return (fs::path(path_) / kEviden
 std::string RunFolder::report_path() const { return (fs::path(path_) / kReportFile).string(); }
 
 void RunFolder::write_record(const RunRecord& record) {
-  // A path need not be UTF-8, which JSON is.
-  std::string text =
-      to_json(record, detections_).dump(2, ' ', false, Json::error_handler_t::replace) + '\n';
+  RunRecord whole = record;
+  whole.machine = this_machine();
+  if (record.stopped_by != kRunning) whole.results = run_results(detections_, record.wall_s);
+  std::string text = to_json(whole) + '\n';
   if (record.stopped_by == kRunning) text.append(kRoomForTheEnd - 1, ' ').push_back('\n');
   const fs::path file = fs::path(path_) / kRecordFile;
   try {
@@ -217,31 +130,9 @@ void RunFolder::write_record(const RunRecord& record) {
   } catch (const Error&) {
     if (!write_in_place(file, text)) throw;
   }
-  const bool has_ended = record.stopped_by == "end" || record.stopped_by == "interrupt";
-  if (has_ended && !detections_.empty()) earlier_->remove();
+  if (record.has_ended() && !detections_.empty()) earlier_->remove();
 }
 
 RunFolder::~RunFolder() = default;
-
-double total_ms(const StepTimes& times) {
-  return times.content_ms + times.retrieval_ms + times.features_ms + times.verification_ms;
-}
-
-TimeSummary summarize(const std::vector<Detection>& detections,
-                      const std::function<double(const StepTimes&)>& time_ms) {
-  std::vector<double> times;
-  for (const Detection& detection : detections) {
-    if (detection.status != Status::unreadable) times.push_back(time_ms(detection.times));
-  }
-  if (times.empty()) return {};
-  std::sort(times.begin(), times.end());
-  double sum = 0;
-  for (const double time : times) sum += time;
-  const auto quantile = [&](double share) {
-    const double rank = std::ceil(share * static_cast<double>(times.size()));  // from 1
-    return times[static_cast<std::size_t>(rank) - 1];
-  };
-  return {sum / static_cast<double>(times.size()), quantile(0.5), quantile(0.99), times.back()};
-}
 
 }  // namespace loopbit

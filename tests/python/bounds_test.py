@@ -39,7 +39,7 @@ def ticks_while(read, path):
 threading.Thread(target=tick, daemon=True).start()
 for number, (read, text, comment) in enumerate([
         (loopbit.read_match_list, "5,1", "#"), (loopbit.truth_kind, "5,1", "#"),
-        (_loopbit._read_place_runs, "5,1", "#"), (_loopbit._read_frame_list, "5", "#"),
+        (loopbit.read_truth, "5,1", "#"),
         (lambda path: loopbit.read_positions(path, [None]), "1 0 0 0 0 1 0 0 0 0 1 0", "#"),
         (loopbit.load_options, "{}", "//")]):
     path = os.path.join(sys.argv[1], str(number))

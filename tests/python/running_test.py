@@ -1,6 +1,8 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
+import inspect
 import json
+import re
 
 import numpy as np
 import pytest
@@ -158,23 +160,32 @@ def test_truth_may_count_two_images_as_one_frame(dataset, tmp_path):
     assert left.positives == 2
 
 
-@pytest.mark.parametrize("part, damaged, positives", [
-    ("input", {"every": 2, "views": 0}, 1),
-    ("input", {"every": 2, "views": "two"}, 1),
-    ("input", {"every": 2, "views": 9}, 2),
-    ("input", [2], 2),
-    ("score", {"tolerance_frames": "none"}, 1),
-    ("score", 7, 1),
+@pytest.mark.parametrize("part, damaged, words", [
+    ("input", {"every": 2, "views": 0}, "0 for 'input.views'"),
+    ("input", {"every": 2, "views": "two"}, "\"two\" for 'input.views'"),
+    ("input", [2], "an array for 'input'"),
+    ("score", {"tolerance_frames": "none"}, "\"none\" for 'score.tolerance_frames'"),
+    ("score", 7, "7 for 'score'"),
 ])
-def test_what_makes_no_sense_in_a_record_is_as_if_missing(dataset, tmp_path, part, damaged,
-                                                          positives):
+def test_what_makes_no_sense_in_a_record_is_named(dataset, tmp_path, part, damaged, words):
     source = loopbit.open_source(dataset / "images", every=2)
     (tmp_path / "true.csv").write_text("30,2\n31,2\n")
     run = loopbit.run_folder(source, tmp_path / "run", evidence=False, truth=tmp_path / "true.csv")
     record = json.loads(run.record_json)
     (tmp_path / "run" / "run.json").write_text(json.dumps({**record, part: damaged}))
-    given = None if part == "score" else tmp_path / "true.csv"
-    assert loopbit.evaluate(tmp_path / "run", given).decision.positives == positives
+    for read in (loopbit.evaluate, loopbit.read_run, loopbit.write_report):
+        with pytest.raises(loopbit.InputError, match=words):
+            read(tmp_path / "run")
+
+
+def test_more_views_than_frames_read_are_one_frame(dataset, tmp_path):
+    source = loopbit.open_source(dataset / "images", every=2)
+    (tmp_path / "true.csv").write_text("30,2\n31,2\n")
+    run = loopbit.run_folder(source, tmp_path / "run", evidence=False)
+    record = json.loads(run.record_json)
+    record["input"]["views"] = 9
+    (tmp_path / "run" / "run.json").write_text(json.dumps(record))
+    assert loopbit.evaluate(tmp_path / "run", tmp_path / "true.csv").decision.positives == 2
 
 
 def test_a_run_read_to_its_end_has_no_more_frames(dataset, tmp_path):
@@ -199,7 +210,47 @@ def test_frames_that_nobody_knows():
         loopbit.GroundTruth([], every=0)
 
 
+# Flags of 'loopbit run' that run_folder() has by another name, or not at all.
+RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views": "views",
+           "truth_variable": "variable", "poses": "positions_m", "no_report": "evidence"}
+OF_OPTIONS = {"preset", "config", "set"}
+OF_SOURCE = {"every", "limit", "max_megapixels"}
+OF_THE_COMMAND = {"help", "threads", "pictures_mb"}
+
+
+def test_run_folder_has_what_the_command_has(command):
+    flags = {name.replace("-", "_") for name in
+             re.findall(r"^ +(?:-\w,)?--([\w-]+)", command("run", "--help"), re.MULTILINE)}
+    assert {"out", "map_cache_mb"} < flags
+    assert OF_SOURCE <= flags and OF_OPTIONS <= flags and OF_THE_COMMAND <= flags
+    expected = {RENAMED.get(flag, flag) for flag in flags - OF_OPTIONS - OF_SOURCE - OF_THE_COMMAND}
+    parameters = set(inspect.signature(loopbit.run_folder).parameters)
+    assert parameters - {"source", "options", "on_bad_frame"} == expected
+    scoring = expected & set(inspect.signature(loopbit.evaluate).parameters)
+    assert scoring == {"truth", "protocol", "tolerance_frames", "poses", "views", "variable",
+                       "not_false", "ignore"}
+
+
+def test_run_folder_scores_by_files_as_the_command_does(command, dataset, tmp_path):
+    (tmp_path / "ignore.csv").write_text("100\n")
+    command("run", dataset / "images", "--out", tmp_path / "cpp", "--truth", dataset / "truth.csv",
+            "--not-false", dataset / "not_false.csv", "--ignore", tmp_path / "ignore.csv",
+            "--tolerance", 2, "--no-report", "--map", tmp_path / "cpp.db", "--map-cache-mb", 1)
+    given = {"truth": dataset / "truth.csv", "not_false": dataset / "not_false.csv",
+             "ignore": tmp_path / "ignore.csv", "tolerance_frames": 2}
+    ours = loopbit.run_folder(dataset / "images", tmp_path / "python", evidence=False,
+                              map=tmp_path / "python.db", map_cache_mb=1, **given)
+    for name in ("truth.csv", "not_false.csv", "ignore.csv"):
+        ours_bytes = (tmp_path / "python" / name).read_bytes()
+        assert ours_bytes == (tmp_path / "cpp" / name).read_bytes(), name
+    theirs = json.loads((tmp_path / "cpp" / "run.json").read_text())
+    assert json.loads(ours.record_json)["score"] == theirs["score"]
+    assert loopbit.evaluate(ours, **given).to_json() == loopbit.evaluate(ours).to_json()
+
+
 BAD_ARGUMENTS = [
+    ({"ignore": "ignore.csv"}, loopbit.OptionError, "ignore applies to .* give truth"),
+    ({"tolerance_frames": -1}, loopbit.OptionError, "tolerance_frames is -1"),
     ({"keep_images": True, "map": None}, loopbit.OptionError, "keep_images .* give map"),
     ({"protocol": "kitti"}, loopbit.OptionError, "give truth"),
     ({"protocol": "nobody", "truth": "truth.csv"}, loopbit.OptionError, "no protocol 'nobody'"),
@@ -341,7 +392,7 @@ def test_bad_evaluations(run, dataset):
         loopbit.evaluate(run, protocol="nobody")
     with pytest.raises(ValueError, match="fixes it"):
         loopbit.evaluate(run, protocol="kitti", tolerance_frames=1)
-    with pytest.raises(ValueError, match="fixes them"):
+    with pytest.raises(ValueError, match="views cannot be given .* fixes it"):
         loopbit.read_truth(dataset / "poses.txt", protocol="kitti", views=2)
     with pytest.raises(loopbit.OptionError, match="as the path"):
         loopbit.evaluate(run, protocol="kitti")

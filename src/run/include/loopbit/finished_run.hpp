@@ -11,6 +11,8 @@
 #include "loopbit/detection.hpp"
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/match_list.hpp"
+#include "loopbit/run_record.hpp"
+#include "loopbit/scoring.hpp"
 
 namespace loopbit {
 
@@ -18,7 +20,8 @@ namespace loopbit {
 struct FinishedRun {
   std::string path;
   std::vector<Detection> detections;
-  std::string record_json;           ///< run.json; empty if there is none
+  std::string record_json;           ///< the text of run.json; empty if there is none
+  std::optional<RunRecord> record;   ///< what it says
   std::optional<GroundTruth> truth;  ///< the truth that the run was given
   /// Camera centres, one per frame; empty if the run had no poses.
   std::vector<std::optional<cv::Vec3d>> positions_m;
@@ -28,6 +31,12 @@ struct FinishedRun {
 /// Reads a run folder, also of an interrupted run. Throws Error (kind input) if `path` has no run
 /// or one of its files is malformed.
 FinishedRun read_run(const std::string& path);
+
+/// The frames of `run`, with their times.
+FramesRead frames_read(const FinishedRun& run);
+
+/// The truth that `run` was given, and how it was scored.
+Scoring recorded_scoring(const FinishedRun& run);
 
 /// Reads the rows of a loops.csv. A last row without a line end was cut off and is dropped. Throws
 /// Error (kind input) with file and line.

@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <cstdio>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,36 +12,10 @@
 #include <opencv2/core.hpp>
 
 #include "loopbit/detection.hpp"
-#include "loopbit/evaluation.hpp"
 #include "loopbit/ground_truth.hpp"
-#include "loopbit/loop_detector_options.hpp"
+#include "loopbit/run_record.hpp"
 
 namespace loopbit {
-
-/// RunRecord::stopped_by of a run that has not ended.
-inline constexpr const char* kRunning = "running";
-
-/// The data of a run besides its detections; see docs/run_folder.md.
-struct RunRecord {
-  std::string input;        ///< as given by the user
-  std::string description;  ///< description of the input, see ImageSource
-  LoopDetectorOptions options;
-  int every = 1;  ///< only every N-th frame of the input was read
-  int views = 1;  ///< images per frame of the truth (2: left, right)
-  int limit = 0;  ///< at most this many frames were read; 0 = all
-  int threads = 1;
-  int map_session = 0;        ///< session of this run, if there is a map
-  std::string map_path = {};  ///< empty = none
-  /// "running", "end", "interrupt", or an error message. A killed run keeps "running".
-  std::string stopped_by = "end";
-  double wall_s = 0;  ///< reading and detecting
-  std::vector<std::string> arguments =
-      {};                      ///< of the command, without its name; empty for a library
-  std::string early_end = {};  ///< of the input, see ImageSource
-  std::string truth = {};      ///< description of the truth, for people
-  int truth_every = 1;         ///< see GroundTruth::every
-  std::optional<Evaluation> score = std::nullopt;
-};
 
 class EarlierRun;
 
@@ -96,22 +69,6 @@ class RunFolder {
   std::int64_t loops_bytes_ = 0;                 ///< of whole rows
   std::vector<Detection> detections_;
 };
-
-/// Total time of all steps.
-double total_ms(const StepTimes& times);
-
-/// Statistics of a time over a run, in milliseconds.
-struct TimeSummary {
-  double mean = 0;
-  double p50 = 0;
-  double p99 = 0;
-  double max = 0;
-};
-
-/// The statistics of a time, such as &StepTimes::content_ms or total_ms, over the readable frames;
-/// zeros if there are none.
-TimeSummary summarize(const std::vector<Detection>& detections,
-                      const std::function<double(const StepTimes&)>& time_ms);
 
 /// The header of loops.csv, without a line end.
 inline constexpr const char* kLoopsHeader =

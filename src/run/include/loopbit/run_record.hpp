@@ -1,0 +1,96 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "loopbit/detection.hpp"
+#include "loopbit/evaluation.hpp"
+#include "loopbit/loop_detector_options.hpp"
+#include "loopbit/version.hpp"
+
+namespace loopbit {
+
+/// RunRecord::stopped_by of a run that has not ended.
+inline constexpr const char* kRunning = "running";
+
+/// Statistics of a time over a run, in milliseconds.
+struct TimeSummary {
+  double mean = 0;
+  double p50 = 0;
+  double p99 = 0;
+  double max = 0;
+};
+
+/// The computer of a run.
+struct Machine {
+  std::string processor = "unknown";
+  int cores = 0;
+  std::string kernel = {};  ///< instruction set in use
+  std::string system = {};
+};
+
+/// What is counted and measured when a run has ended.
+struct RunResults {
+  int frames = 0;
+  std::array<int, kAllStatuses.size()> by_status{};  ///< frames, in the order of kAllStatuses
+  TimeSummary content_ms, retrieval_ms, features_ms, verification_ms, total_ms;
+  double frames_per_s = 0;
+  double peak_memory_mib = 0;
+};
+
+/// Everything in run.json; see docs/run_folder.md.
+struct RunRecord {
+  std::string input;        ///< as given by the user
+  std::string description;  ///< description of the input, see ImageSource
+  LoopDetectorOptions options;
+  int every = 1;  ///< only every N-th frame of the input was read
+  int views = 1;  ///< images per frame of the truth (2: left, right)
+  int limit = 0;  ///< at most this many frames were read; 0 = all
+  int threads = 1;
+  int map_session = 0;        ///< session of this run, if there is a map
+  std::string map_path = {};  ///< empty = none
+  /// "running", "end", "interrupt", or an error message. A killed run keeps "running".
+  std::string stopped_by = "end";
+  double wall_s = 0;  ///< reading and detecting
+  std::vector<std::string> arguments =
+      {};                      ///< of the command, without its name; empty for a library
+  std::string early_end = {};  ///< of the input, see ImageSource
+  std::string truth = {};      ///< description of the truth, for people
+  int truth_every = 1;         ///< see GroundTruth::every
+  std::optional<Evaluation> score = std::nullopt;  ///< read without its lists
+  std::string version = kVersion;                  ///< of the loopbit that wrote it
+  Machine machine = {};
+  std::optional<RunResults> results = std::nullopt;  ///< none while the run is running
+
+  /// Whether the run came to its end, or was interrupted in order.
+  [[nodiscard]] bool has_ended() const { return stopped_by == "end" || stopped_by == "interrupt"; }
+};
+
+/// The text of run.json.
+std::string to_json(const RunRecord& record);
+
+/// Reads what to_json() wrote, in this version or an earlier one. Missing values keep their
+/// defaults, and unknown keys are ignored. Throws Error (kind input) with `file`, key and value if
+/// `json` is no record of a run, or a value has another type.
+RunRecord run_record_from_json(const std::string& json, const std::string& file);
+
+/// The computer that this process runs on.
+Machine this_machine();
+
+/// The results of a run that took `wall_s`; peak memory is that of this process.
+RunResults run_results(const std::vector<Detection>& detections, double wall_s);
+
+/// Total time of all steps.
+double total_ms(const StepTimes& times);
+
+/// The statistics of a time, such as &StepTimes::content_ms or total_ms, over the readable frames;
+/// zeros if there are none.
+TimeSummary summarize(const std::vector<Detection>& detections,
+                      const std::function<double(const StepTimes&)>& time_ms);
+
+}  // namespace loopbit
