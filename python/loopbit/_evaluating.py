@@ -58,7 +58,9 @@ def read_truth(
     """
     scoring, _ = request(os.fspath(path), protocol=protocol, poses=poses, variable=variable,
                          views=views, not_false=not_false, ignore=ignore)
-    return scoring.read_truth(every, list(times_s), all_read)
+    truth = scoring.read_truth(every, list(times_s), all_read)
+    assert truth is not None, "a request with a path has truth"
+    return truth
 
 
 def evaluate(
@@ -87,7 +89,9 @@ def evaluate(
     if isinstance(found, (str, os.PathLike)):
         is_run = os.path.isdir(found)
         found = _loopbit.read_run(found) if is_run else _loopbit.read_match_list(found)
-    run = found if isinstance(found, FinishedRun) else None
-    if not isinstance(found, MatchList):
-        found = _loopbit.match_list(list(found) if run is None else run.detections)
-    return _loopbit._evaluate(found, run, known, scoring)
+    if isinstance(found, FinishedRun):
+        matches = _loopbit.match_list(found.detections)
+        return _loopbit._evaluate(matches, found, known, scoring)
+    matches = found if isinstance(found, MatchList) else _loopbit.match_list(list(found))
+    # The binding takes None, but its signature does not say so.
+    return _loopbit._evaluate(matches, None, known, scoring)  # type: ignore[arg-type]
