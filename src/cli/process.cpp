@@ -51,11 +51,11 @@ extern "C" void tell_heard(int signal) {
 
 #endif
 
-std::atomic<bool> stop_requested{false};
+std::atomic<bool> signal_arrived{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
 
 extern "C" void request_stop(int signal) {
-  stop_requested = true;
+  signal_arrived = true;
   std::signal(signal, SIG_DFL);
 }
 
@@ -104,7 +104,7 @@ const std::atomic<bool>& stop_on_signal() {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);
   if (std::signal(SIGHUP, request_stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // by nohup
-  return stop_requested;
+  return signal_arrived;
 }
 
 void open_page(const std::string& path) {
