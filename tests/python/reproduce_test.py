@@ -5,27 +5,15 @@
 import json
 import pathlib
 import shutil
-import struct
 import subprocess
 import sys
 
 import pytest
 
-SCRIPT = pathlib.Path(__file__).resolve().parent.parent.parent / "scripts" / "reproduce"
-
-
-def write_matrix(path, size, cells):
-    """A dense loop matrix of bytes in a MAT-file of version 5."""
-    def element(kind, data):
-        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
-
-    dense = bytearray(size * size)
-    for row, column in cells:
-        dense[column * size + row] = 1
-    matrix = (element(6, struct.pack("<II", 9, 0)) + element(5, struct.pack("<ii", size, size))
-              + element(1, b"truth") + element(2, bytes(dense)))
-    header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
-    path.write_bytes(header + element(14, matrix))
+TESTS = pathlib.Path(__file__).resolve().parent.parent
+SCRIPT = TESTS.parent / "scripts" / "reproduce"
+sys.path.append(str(TESTS))
+from mat_file import write_mat  # noqa: E402, of the tests of the command
 
 
 @pytest.fixture
@@ -45,7 +33,7 @@ def data(dataset, tmp_path):
     (city / "Images").mkdir(parents=True)
     for number, image in enumerate(images + images):
         shutil.copy(image, city / "Images" / f"{number + 1:04}.png")
-    write_matrix(city / "CityCentreGroundTruth.mat", 24, [(12, 0), (23, 11)])
+    write_mat(city / "CityCentreGroundTruth.mat", "truth", 24, [(12, 0), (23, 11)])
     return folder
 
 
@@ -74,7 +62,7 @@ def test_prints_the_papers_table_for_the_sets_there_are(data, tmp_path):
 
 @pytest.mark.parametrize("rows, frames", [(12, 12), (24, 24)])
 def test_a_matrix_of_left_images_takes_every_other_image(data, tmp_path, rows, frames):
-    write_matrix(data / "City_Centre" / "CityCentreGroundTruth.mat", rows, [(11, 0)])
+    write_mat(data / "City_Centre" / "CityCentreGroundTruth.mat", "truth", rows, [(11, 0)])
     ran = reproduce(data, tmp_path / "out")
     assert ran.returncode == 0, ran.stderr
     assert record(tmp_path / "out" / "citycentre")["counts"]["frames"] == frames
@@ -92,7 +80,7 @@ def test_a_sequence_without_images_is_skipped(data, tmp_path):
 
 
 def test_sets_before_one_that_fails_are_printed(data, tmp_path):
-    write_matrix(data / "City_Centre" / "CityCentreGroundTruth.mat", 5, [(3, 0)])
+    write_mat(data / "City_Centre" / "CityCentreGroundTruth.mat", "truth", 5, [(3, 0)])
     ran = reproduce(data, tmp_path / "out")
     assert ran.returncode == 1 and "CityCentreGroundTruth.mat" in ran.stderr
     assert "KITTI 00" in ran.stdout[ran.stdout.index("Recall in percent"):]
