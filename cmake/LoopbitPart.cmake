@@ -2,8 +2,7 @@
 #
 # A part of the library: sources of its own, public headers in include/loopbit/, and the parts it may
 # know. A part that does not name another in LINKS cannot include its headers, which is how the
-# include direction is held. All parts of one library are shipped as that one library. A part is compiled
-# as one source: that takes a third of the time, since most of it goes into the headers.
+# include direction is held. All parts of one library are shipped as that one library.
 function(loopbit_part name)
   cmake_parse_arguments(PART "" "" "HEADERS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   set(target loopbit_${name})
@@ -14,8 +13,7 @@ function(loopbit_part name)
     ${target}
     PUBLIC ${PART_LINKS}
     PRIVATE ${PART_PRIVATE_LINKS} loopbit_warnings)
-  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON UNITY_BUILD ON
-                                             UNITY_BUILD_BATCH_SIZE 0
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON
                                              LOOPBIT_OBJECTS $<TARGET_OBJECTS:${target}>)
   loopbit_export_only_public(${target} "${PART_HEADERS}")
   list(TRANSFORM PART_HEADERS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/include/loopbit/)
