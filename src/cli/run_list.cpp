@@ -80,6 +80,10 @@ ReportRun report_run(const std::string& text, const TruthFlags& flags) {
   return std::move(listed.run);
 }
 
+std::string report_in(const std::string& folder) {
+  return (fs::path(folder) / "report.html").string();
+}
+
 ReportRun scored_run(const std::string& text, const TruthFlags& flags) {
   ReportRun run = report_run(text, flags);
   if (!run.truth) {

@@ -84,15 +84,10 @@ void TruthFlags::add_poses_to(CLI::App& command) {
       ->type_name("FILE");
 }
 
-void TruthFlags::check(int every, std::optional<std::size_t> frames, bool all) const {
-  if (!poses.empty()) check_poses(poses, frames, every);
-  scoring.check(every, frames, all);
-}
-
 Positions TruthFlags::read_positions(const FramesRead& frames) const {
   const std::string file = poses.empty() ? scoring.poses_file() : poses;
   if (file.empty()) return {};
-  return loopbit::read_positions(file, frames.times_s, frames.every_of_truth());
+  return loopbit::read_positions(file, frames);
 }
 
 std::string list_truth_settings() {

@@ -14,9 +14,9 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/read_file.hpp"
-#include "loopbit/run_folder.hpp"
 
 #include "run_files.hpp"
+#include "run_folder.hpp"
 
 namespace loopbit {
 namespace {
@@ -199,9 +199,8 @@ FramesRead frames_read(const FinishedRun& run) {
   FramesRead frames;
   for (const Detection& detection : run.detections) frames.times_s.push_back(detection.timestamp_s);
   if (!run.record) return frames;
-  frames.every = run.record->every;
-  frames.views = run.record->views;
-  frames.all = run.record->stopped_by == "end" && run.record->limit == 0;
+  frames.every = run.record->sampling.every;
+  frames.all = run.record->stopped_by == "end" && run.record->sampling.limit == 0;
   return frames;
 }
 

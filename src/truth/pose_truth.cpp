@@ -13,7 +13,7 @@
 #include "loopbit/poses.hpp"
 
 #include "nearby_poses.hpp"
-#include "place_runs.hpp"
+#include "truth_rows.hpp"
 
 namespace loopbit {
 namespace {

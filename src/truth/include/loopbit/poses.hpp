@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
@@ -34,25 +33,23 @@ std::vector<CameraPose> read_poses(const std::string& path);
 /// (at most kMaxPoseDelay_s away), in any order; of equal times the first row counts. Otherwise row
 /// by row. Throws Error (kind input) if neither works: no pose is near in time, or there are no
 /// times and the numbers of rows differ.
-std::vector<std::optional<CameraPose>> poses_of_frames(
-    const std::vector<CameraPose>& poses, const std::vector<std::optional<double>>& times_s);
+std::vector<std::optional<CameraPose>> poses_of_frames(const std::vector<CameraPose>& poses,
+                                                       const FrameTimes& times_s);
 
 inline constexpr double kMaxPoseDelay_s = 0.05;
 
-/// Camera centres from a file of poses, one per frame read: every N-th frame of the sequence, with
-/// the times `times_s`. If poses and frames have times, they are matched by time. Otherwise frame k
-/// is row k * every; further rows belong to a run that ended early. If `times_s` is empty, the
-/// frames are unknown, and all rows without times are returned. Throws Error (kind input) as
-/// read_poses and poses_of_frames do, and if there are too few rows; (kind option) if `every` is
-/// less than 1.
-std::vector<std::optional<cv::Vec3d>> read_positions(
-    const std::string& path, const std::vector<std::optional<double>>& times_s, int every = 1);
+using Positions = std::vector<std::optional<cv::Vec3d>>;  ///< one per frame, if it is known
 
-/// Throws what read_positions() would, as far as can be told before the frames are read, of which
-/// there will be `frames` if that is known; and, where these are `all_read`, that the sequence does
-/// not have as many frames as the file has rows, see TruthOptions.
-void check_poses(const std::string& path, std::optional<std::size_t> frames, int every = 1,
-                 bool all_read = false);
+/// Camera centres from a file of poses, one per frame read. If poses and frames have times, they
+/// are matched by time. Otherwise frame k is row k * every; further rows belong to a run that ended
+/// early. If the frames are not known, all rows without times are returned. Throws Error (kind
+/// input) as read_poses and poses_of_frames do, and if there are too few rows; (kind option) if
+/// `every` is less than 1.
+Positions read_positions(const std::string& path, FramesRead frames);
+
+/// Throws what read_positions() would, as far as can be told before the `frames` are read, with
+/// their number but without their times. If they are `all`, the file must not have more rows.
+void check_poses(const std::string& path, const FramesRead& frames);
 
 /// The rule by which two frames with known poses show the same place.
 struct PoseTruthOptions {
