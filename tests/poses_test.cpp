@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "camera_poses.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "evidence_writer.hpp"
+#include "report_json.hpp"
 #include "run_folder.hpp"
 #include "test_support.hpp"
 

@@ -13,6 +13,7 @@
 #include "loopbit/runner.hpp"
 
 #include "evidence_writer.hpp"
+#include "run_files.hpp"
 #include "run_folder.hpp"
 #include "test_support.hpp"
 

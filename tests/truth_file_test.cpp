@@ -17,6 +17,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sys/stat.h>
 
+#include "camera_poses.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {

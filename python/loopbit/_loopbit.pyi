@@ -363,10 +363,9 @@ class RankedPlace:
     def similarity(self) -> float: ...
 
 class RetrievalOptions:
-    def __init__(self, *, max_candidates: int = ..., min_similarity: float = ..., shift_tolerance_columns: int = ..., min_spacing: int = ..., max_count_difference: int = ..., max_center_distance_px: float = ...) -> None: ...
+    def __init__(self, *, max_candidates: int = ..., min_similarity: float = ..., shift_tolerance_columns: int = ..., min_spacing: int = ..., max_center_distance_px: float = ...) -> None: ...
     max_candidates: int
     max_center_distance_px: float
-    max_count_difference: int
     min_similarity: float
     min_spacing: int
     shift_tolerance_columns: int

@@ -101,10 +101,10 @@ std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector
 
 Evaluation evaluate_found(const MatchList& matches, const FinishedRun* run,
                           const std::optional<GroundTruth>& known, const ScoringRequest& request) {
-  const FramesRead frames = run ? frames_read(*run) : FramesRead{.times_s = matches.times_s};
+  const FramesRead frames = run ? run->frames() : FramesRead{.times_s = matches.times_s};
   const bool is_recorded = run && !known;
   const auto [truth, evaluation] =
-      request.resolve(frames, is_recorded ? recorded_scoring(*run) : Scoring{known, {}});
+      request.resolve(frames, is_recorded ? run->scoring() : Scoring{known, {}});
   if (truth) return evaluate(matches, *truth, evaluation);
   throw Error(ErrorKind::option, "There is no ground truth; give truth.");
 }

@@ -13,6 +13,8 @@
 #include "loopbit/evaluation_fields.hpp"
 #include "loopbit/json_fields.hpp"
 
+#include "run_files.hpp"
+
 namespace loopbit {
 namespace {
 

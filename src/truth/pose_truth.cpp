@@ -10,8 +10,8 @@
 #include <opencv2/core.hpp>
 
 #include "loopbit/error.hpp"
-#include "loopbit/poses.hpp"
 
+#include "camera_poses.hpp"
 #include "nearby_poses.hpp"
 #include "truth_rows.hpp"
 

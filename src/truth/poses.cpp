@@ -13,6 +13,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/text_rows.hpp"
 
+#include "camera_poses.hpp"
 #include "truth_rows.hpp"
 
 namespace loopbit {

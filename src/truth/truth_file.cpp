@@ -13,6 +13,7 @@
 #include "loopbit/image_file.hpp"
 #include "loopbit/text_rows.hpp"
 
+#include "camera_poses.hpp"
 #include "mat_file.hpp"
 #include "truth_matrix.hpp"
 #include "truth_rows.hpp"

@@ -14,7 +14,7 @@ namespace loopbit {
 template <typename Io, typename Scored>
 void transfer_evaluation(Io& io, const std::string& place, Scored& scored) {
   auto& decision = scored.decision;
-  const Interval interval = wilson_interval(decision.right, decision.right + decision.wrong);
+  const Interval interval = decision.precision_interval();
   io.or_null(place + "/protocol", scored.options.protocol);
   io(place + "/tolerance_frames", scored.options.tolerance_frames);
   io(place + "/positives", decision.positives);

@@ -70,14 +70,6 @@ struct RunRecord {
   [[nodiscard]] bool has_ended() const { return stopped_by == "end" || stopped_by == "interrupt"; }
 };
 
-/// The text of run.json.
-std::string to_json(const RunRecord& record);
-
-/// Reads what to_json() wrote, in this version or an earlier one. Missing values keep their
-/// defaults, and unknown keys are ignored. Throws Error (kind input) with `file`, key and value if
-/// `json` is no record of a run, or a value has another type.
-RunRecord run_record_from_json(const std::string& json, const std::string& file);
-
 /// Total time of all steps.
 double total_ms(const StepTimes& times);
 
