@@ -47,6 +47,11 @@ void TruthFlags::add_to(CLI::App& command) {
   command.add_option(names.ignore, scoring.ignore, "Queries that are not scored, one per line")
       ->type_name("FILE")
       ->needs(truth);
+  add_rules_to(command, truth);
+}
+
+void TruthFlags::add_rules_to(CLI::App& command, CLI::Option* truth) {
+  const ScoringNames& names = scoring.names;
   command
       .add_option(names.protocol, scoring.protocol, "A published scoring protocol, listed below")
       ->type_name("NAME")

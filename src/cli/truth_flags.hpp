@@ -23,6 +23,10 @@ struct TruthFlags {
   /// Where the camera was, if poses were named, as such or as the truth; else nothing. Where the
   /// frames are not known, every pose is one.
   [[nodiscard]] Positions read_positions(const FramesRead& frames) const;
+
+ private:
+  /// How the file of the flag `truth` is read, and matches judged by it.
+  void add_rules_to(CLI::App& command, CLI::Option* truth);
 };
 
 /// The settings of PoseTruthOptions and the protocols, for a command's footer.
