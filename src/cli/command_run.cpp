@@ -7,6 +7,7 @@
 
 #include "commands.hpp"
 #include "session.hpp"
+#include "truth_flags.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -14,37 +15,21 @@ namespace {
 struct RunFlags {
   SessionFlags session;
   std::string input;
-  int every = 1;
-  int limit = 0;
+  Sampling sampling;
   int max_megapixels = kMaxMegapixels;
   TruthFlags truth;
 };
 
-int run_command(const RunFlags& flags, const Arguments& arguments) {
-  Session session;
-  if (flags.session.out.empty() && flags.session.map.empty()) {
+int run_command(RunFlags& flags, const Arguments& arguments) {
+  RunRequest& run = flags.session.run;
+  if (run.folder.empty() && run.map.empty()) {
     throw Error(ErrorKind::option, "The run has no output; add --out DIR, --map MAP.db, or both.");
   }
-  session.source =
-      subsample(open_source(flags.input, flags.max_megapixels),
-                static_cast<std::size_t>(flags.every), static_cast<std::size_t>(flags.limit));
-  const std::optional<std::size_t> frames = exact_size(*session.source, flags.input);
-  const bool is_whole = frames && flags.limit == 0;
-  flags.truth.check(flags.every, frames, is_whole);
-  session.scoring = [&, frames, is_whole](const FrameTimes& times_s) {
-    const bool all = is_whole && times_s.size() == *frames;
-    return flags.truth.scoring.resolve({.every = flags.every, .times_s = times_s, .all = all});
-  };
-  session.positions = [&](const FrameTimes& times_s) {
-    return flags.truth.read_positions({.every = flags.every, .times_s = times_s});
-  };
-  session.input = flags.input;
-  session.arguments = arguments;
-  session.truth_files = flags.truth.files();
-  session.truth_description = flags.truth.scoring.description();
-  session.every = flags.every;
-  session.limit = flags.limit;
-  return run_session(std::move(session), flags.session);
+  run.arguments = arguments;
+  run.scoring = flags.truth.scoring;
+  run.poses = flags.truth.poses;
+  return run_session(subsample(open_source(flags.input, flags.max_megapixels), flags.sampling),
+                     flags.input, flags.sampling, flags.session);
 }
 
 }  // namespace
@@ -59,14 +44,14 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
       ->required();
   command
       ->add_option(
-          "--out", flags->session.out,
+          "--out", flags->session.run.folder,
           "Folder for loops.csv, run.json and report.html; default with --map: MAP_session_N")
       ->type_name("DIR");
   flags->session.add_to(*command);
-  command->add_option("--every", flags->every, "Read only every N-th frame")
+  command->add_option("--every", flags->sampling.every, "Read only every N-th frame")
       ->type_name("N")
       ->check(whole_number(1, 1'000'000));
-  command->add_option("--limit", flags->limit, "Read at most N frames; 0 = all")
+  command->add_option("--limit", flags->sampling.limit, "Read at most N frames; 0 = all")
       ->type_name("N")
       ->check(whole_number(0, 2'000'000'000));
   add_image_flag(*command, flags->max_megapixels);

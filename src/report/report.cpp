@@ -15,12 +15,14 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/evidence_file.hpp"
+#include "loopbit/judge.hpp"
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/version.hpp"
 #include "loopbit/write_file.hpp"
 
 #include "base64.hpp"
 #include "pictures.hpp"
+#include "report_json.hpp"
 #include "report_page.hpp"
 #include "similarity_matrix.hpp"
 
