@@ -11,22 +11,22 @@
 namespace loopbit::test {
 namespace {
 
-constexpr int kWidth_px = 640;
-constexpr int kHeight_px = 480;
+constexpr int kViewWidth_px = 640;
+constexpr int kViewHeight_px = 480;
 constexpr int kBonnetTop_px = 400;
 
-void add(Features& features, int x_px, int y_px) {
+void add_feature(Features& features, int x_px, int y_px) {
   features.keypoints.push_back({static_cast<float>(x_px), static_cast<float>(y_px), 2.0F, 0.0F});
   features.descriptors.emplace_back();
 }
 
 /// Features at random above the bonnet.
-Features view(Random& random) {
+Features bare_view(Random& random) {
   Features features;
-  features.working_size_px = {kWidth_px, kHeight_px};
+  features.working_size_px = {kViewWidth_px, kViewHeight_px};
   for (int i = 0; i < 200; ++i) {
-    add(features, static_cast<int>(random.below(kWidth_px)),
-        static_cast<int>(random.below(kBonnetTop_px)));
+    add_feature(features, random.between(0, kViewWidth_px - 1),
+                random.between(0, kBonnetTop_px - 1));
   }
   features.num_dark = features.keypoints.size() / 2;
   return features;
@@ -34,19 +34,19 @@ Features view(Random& random) {
 
 /// With a bonnet, whose features stand 20 px apart.
 Features view_with_bonnet(Random& random) {
-  Features features = view(random);
-  for (int y = kBonnetTop_px + 10; y < kHeight_px; y += 20) {
-    for (int x = 10; x < kWidth_px; x += 20) add(features, x, y);
+  Features features = bare_view(random);
+  for (int y = kBonnetTop_px + 10; y < kViewHeight_px; y += 20) {
+    for (int x = 10; x < kViewWidth_px; x += 20) add_feature(features, x, y);
   }
   return features;
 }
 
-void remember(AttachedParts& parts, const Features& features) {
+void note_view(AttachedParts& parts, const Features& features) {
   parts.reserve_next(features);
   parts.remember(features);
 }
 
-std::size_t kept(const AttachedParts& parts, Features features) {
+std::size_t num_kept(const AttachedParts& parts, Features features) {
   parts.remove_from(features);
   EXPECT_EQ(features.keypoints.size(), features.descriptors.size());
   return features.keypoints.size();
@@ -57,8 +57,8 @@ TEST(AttachedParts, ABonnetIsRemovedAfterFourViews) {
   AttachedParts parts;
   for (int i = 0; i < 4; ++i) {
     const Features features = view_with_bonnet(random);
-    EXPECT_EQ(kept(parts, features), features.keypoints.size());
-    remember(parts, features);
+    EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
+    note_view(parts, features);
   }
   Features features = view_with_bonnet(random);
   parts.remove_from(features);
@@ -78,38 +78,38 @@ TEST(AttachedParts, AViewWithoutThemKeepsAll) {
   Random random;
   AttachedParts parts;
   for (int i = 0; i < 40; ++i) {
-    const Features features = view(random);
-    EXPECT_EQ(kept(parts, features), features.keypoints.size()) << i;
-    remember(parts, features);
+    const Features features = bare_view(random);
+    EXPECT_EQ(num_kept(parts, features), features.keypoints.size()) << i;
+    note_view(parts, features);
   }
 }
 
 TEST(AttachedParts, ACameraThatStandsStillHasNone) {
   Random random;
   AttachedParts parts;
-  const Features features = view(random);
-  for (int i = 0; i < 40; ++i) remember(parts, features);
-  EXPECT_EQ(kept(parts, features), features.keypoints.size());
+  const Features features = bare_view(random);
+  for (int i = 0; i < 40; ++i) note_view(parts, features);
+  EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
 }
 
 TEST(AttachedParts, AreForgottenWhereTheyAreNoLongerSeen) {
   Random random;
   AttachedParts parts;
-  for (int i = 0; i < 16; ++i) remember(parts, view_with_bonnet(random));
-  for (int i = 0; i < 9; ++i) remember(parts, view(random));
+  for (int i = 0; i < 16; ++i) note_view(parts, view_with_bonnet(random));
+  for (int i = 0; i < 9; ++i) note_view(parts, bare_view(random));
   const Features features = view_with_bonnet(random);
-  EXPECT_EQ(kept(parts, features), features.keypoints.size());
+  EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
 }
 
 TEST(AttachedParts, AnotherWorkingSizeBeginsAnew) {
   Random random;
   AttachedParts parts;
-  for (int i = 0; i < 16; ++i) remember(parts, view_with_bonnet(random));
+  for (int i = 0; i < 16; ++i) note_view(parts, view_with_bonnet(random));
   Features features = view_with_bonnet(random);
-  features.working_size_px = {kWidth_px + 1, kHeight_px};
-  EXPECT_EQ(kept(parts, features), features.keypoints.size());
-  remember(parts, features);
-  EXPECT_EQ(kept(parts, features), features.keypoints.size());
+  features.working_size_px = {kViewWidth_px + 1, kViewHeight_px};
+  EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
+  note_view(parts, features);
+  EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
 }
 
 }  // namespace
