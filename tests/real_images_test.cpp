@@ -10,6 +10,7 @@
 
 #include "loopbit/evaluation.hpp"
 #include "loopbit/finished_run.hpp"
+#include "loopbit/gray_image.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 
@@ -23,7 +24,7 @@ void attach(const cv::Mat& texture, cv::Mat& image) {
   const int height_px = image.rows / 4;
   cv::Mat part;
   cv::resize(texture, part, {image.cols, height_px}, 0, 0, cv::INTER_AREA);
-  image = image.clone();
+  image = gray_image(image).clone();
   part.copyTo(image.rowRange(image.rows - height_px, image.rows));
 }
 
