@@ -136,8 +136,10 @@ std::vector<FrameView> frame_views(const ReportRun& run, const std::optional<Gro
   for (int frame = 0; frame < frames; ++frame) {
     const ReportedMatch* match = best[static_cast<std::size_t>(frame)];
     const bool is_elsewhere = elsewhere[static_cast<std::size_t>(frame)];
-    FrameView view{frame, verdict_of(frame, match, is_elsewhere, judge ? &*judge : nullptr), {}};
+    FrameView view{.frame = frame,
+                   .verdict = verdict_of(frame, match, is_elsewhere, judge ? &*judge : nullptr)};
     if (match) view.partners.push_back(match->match);
+    if (match && match->is_loop) view.loop_score = match->score;
     if (view.verdict == "missed" || view.verdict == "wrong") {
       if (const auto place = places.find(frame); place != places.end()) {
         view.partners.push_back(place->second);
@@ -303,6 +305,7 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
   add_match_columns(json, run.list, frames);
   json["verdict"] = Json::array();
   for (const FrameView& view : views) json["verdict"].push_back(view.verdict);
+  json["first_frame"] = report::first_frame(views);
   json["truth"] = nullptr;
   if (truth) {
     json["truth"] = {{"same_place", flat(truth->same_place)},

@@ -128,6 +128,17 @@ function verdictsOf(columns, truth) {
   });
 }
 
+/** A wrong loop, otherwise the strongest loop of this run, otherwise a missed revisit. */
+function firstFrameOf({ status, match, score }, verdicts) {
+  const wrong = verdicts.indexOf("wrong");
+  if (wrong >= 0) return wrong;
+  const loops = status.flatMap((one, frame) =>
+    one === statusOf("loop") && match[frame] >= 0 ? [frame] : [],
+  );
+  if (loops.length > 0) return loops.reduce((a, b) => (score[b] > score[a] ? b : a));
+  return Math.max(0, verdicts.indexOf("missed"));
+}
+
 function wilson(hits, trials) {
   if (trials === 0) return [0, 1];
   const z = 1.959963984540054;
@@ -375,6 +386,7 @@ function runOf(places, index, options) {
     inliers: isExternal ? null : columns.inliers,
     times_ms,
     verdict,
+    first_frame: firstFrameOf(columns, verdict),
     truth,
     evaluation: truth ? evaluationOf(columns, verdict, truth) : null,
     positions: options.poses

@@ -48,6 +48,8 @@ export interface Run {
   inliers: number[] | null;
   times_ms: StepTimes | null;
   verdict: Verdict[];
+  /** The frame that the page opens on. */
+  first_frame: number;
   /** Flat triples query, first, last; and a description of the source, if known. */
   truth: { same_place: number[]; near_place: number[]; source: string | null } | null;
   evaluation: Evaluation | null;
@@ -58,7 +60,8 @@ export interface Run {
     axes: [x: string, y: string];
   } | null;
   similarity_matrix: SimilarityMatrix | null;
-  /** By frame number. Not every frame has one: the report has a size budget. */
+  /** By frame number. Not every frame has one: the report has a size budget, which the first
+   * frame, wrong loops and the weakest loops use before others. */
   pictures: Record<string, Picture>;
 }
 

@@ -192,16 +192,6 @@ export class RunModel {
     return this.run.record?.times_ms?.[step] ?? (times ? this.summary(times) : null);
   }
 
-  /** The frame shown first: a failure, otherwise the loop with the highest score. */
-  firstFrame(): number {
-    const wrong = this.framesIn("wrong")[0];
-    if (wrong !== undefined) return wrong;
-    const score = (frame: number) => this.score(frame) ?? Number.NEGATIVE_INFINITY;
-    const loops = this.framesIn("loops");
-    const first = loops[0] ?? this.framesIn("missed")[0] ?? 0;
-    return loops.reduce((best, frame) => (score(frame) > score(best) ? frame : best), first);
-  }
-
   /** The mark of a frame. An ignored frame has one only if it is a loop. */
   mark(frame: number): Marked | null {
     const verdict = this.verdict(frame);

@@ -22,7 +22,12 @@ export class Store {
 
   constructor(private readonly models: readonly RunModel[]) {
     const first = models[0];
-    this.selection = { run: 0, frame: first?.firstFrame() ?? 0, against: "match", filter: "all" };
+    this.selection = {
+      run: 0,
+      frame: first?.run.first_frame ?? 0,
+      against: "match",
+      filter: "all",
+    };
     this.selection = this.valid(this.fromAddress());
     addEventListener("hashchange", () => this.change(this.fromAddress()));
   }
