@@ -1,15 +1,20 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <filesystem>
 #include <memory>
+#include <system_error>
 #include <utility>
 
-#include "loopbit/error.hpp"
+#include <fmt/format.h>
 
 #include "commands.hpp"
 #include "session.hpp"
 
 namespace loopbit::cli {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct RunFlags {
   SessionFlags session;
@@ -20,11 +25,25 @@ struct RunFlags {
   TruthFlags truth;
 };
 
+/// "images_loops" in the working folder for a folder "images" anywhere; with a new number if that
+/// exists and must stay.
+std::string usual_folder(const RunFlags& flags) {
+  const fs::path input = fs::absolute(flags.input).lexically_normal();
+  const fs::path last = input.has_filename() ? input : input.parent_path();
+  std::error_code error;
+  std::string name = (fs::is_directory(last, error) ? last.filename() : last.stem()).string();
+  std::replace(name.begin(), name.end(), ':', '_');  // of camera:0
+  std::string folder = name + "_loops";
+  for (int number = 2; !flags.session.overwrite && fs::exists(folder, error); ++number) {
+    folder = fmt::format("{}_loops_{}", name, number);
+  }
+  return folder;
+}
+
 int run_command(const RunFlags& flags, const Arguments& arguments) {
   Session session;
-  if (flags.session.out.empty() && flags.session.map.empty()) {
-    throw Error(ErrorKind::option, "The run has no output; add --out DIR, --map MAP.db, or both.");
-  }
+  SessionFlags output = flags.session;
+  if (output.out.empty() && output.map.empty()) output.out = usual_folder(flags);
   session.source =
       subsample(open_source(flags.input, flags.max_megapixels),
                 static_cast<std::size_t>(flags.every), static_cast<std::size_t>(flags.limit));
@@ -44,7 +63,7 @@ int run_command(const RunFlags& flags, const Arguments& arguments) {
   session.truth_description = flags.truth.scoring.description();
   session.every = flags.every;
   session.limit = flags.limit;
-  return run_session(std::move(session), flags.session);
+  return run_session(std::move(session), output);
 }
 
 }  // namespace
@@ -60,7 +79,8 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   command
       ->add_option(
           "--out", flags->session.out,
-          "Folder for loops.csv, run.json and report.html; default with --map: MAP_session_N")
+          "Folder for loops.csv, run.json and report.html; default: INPUT_loops, with a new number "
+          "if that exists; with --map: MAP_session_N")
       ->type_name("DIR");
   flags->session.add_to(*command);
   command->add_option("--every", flags->every, "Read only every N-th frame")

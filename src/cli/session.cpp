@@ -92,7 +92,9 @@ void SessionFlags::add_to(CLI::App& command) {
                   "Threads, at most one per core; 0 = one per core. Results do not depend on it")
       ->type_name("N")
       ->check(whole_number(0, 1024));
-  command.add_flag("--no-report", no_report, "Store no pictures and write no report.html");
+  CLI::Option* left_out =
+      command.add_flag("--no-report", no_report, "Store no pictures and write no report.html");
+  command.add_flag("--open", open, "Open the report in the browser")->excludes(left_out);
   add_report_flag(command, report);
 }
 
@@ -176,6 +178,7 @@ int run_session(Session session, const SessionFlags& flags) {
   print_summary(recorded.record(), folder, !flags.no_report);
   if (fault && !stop_requested) throw Error(fault->kind(), fault->what());
   if (fault) tell(fmt::format("loopbit: {}\n", fault->what()));
+  if (flags.open && !stop_requested) open_page(folder.report_path());
   return stop_requested ? interrupted : success;
 }
 

@@ -33,6 +33,7 @@ struct SessionFlags {
   std::vector<std::string> settings;  ///< "section.field=value"
   int threads = 0;                    ///< at most one a core; 0 = as many
   bool no_report = false;
+  bool open = false;  ///< the report, in the browser
   ReportOptions report;
 
   void add_to(CLI::App& command);
