@@ -25,7 +25,7 @@ import zlib
 from loopbit_command import (FRAMES, LOOPBIT, QUICK, WORLD, CommandTest, decisions, loopbit, rows)
 
 HEADER = (
-    "frame,timestamp,status,match,score,similarity,matches,inliers,"
+    "frame,timestamp,status,match,score,similarity,matches,inliers,name,match_name,"
     "content_ms,retrieval_ms,features_ms,verification_ms"
 )
 
@@ -47,6 +47,18 @@ class CommandLineTest(CommandTest):
             self.assertEqual(row["match"] == "",
                              row["status"] in ("no_earlier_place", "no_similar_place"), row)
             self.assertGreaterEqual(int(row["matches"]), int(row["inliers"]))
+
+    def test_rows_name_their_image_and_that_of_the_match(self):
+        images = sorted(path.name for path in self.images.iterdir())
+        self.assertEqual([row["name"] for row in rows(self.reference)], images)
+        for row in rows(self.reference):
+            self.assertEqual(row["match_name"], images[int(row["match"])] if row["match"] else "")
+
+    @unittest.skipIf(QUICK, "too few frames")
+    def test_loops_in_a_row_are_one_revisit(self):
+        first, last = re.search(r"(\d+)-(\d+) is 0-\d+\n", self.reference_output).groups()
+        loops = [int(row["frame"]) for row in rows(self.reference) if row["status"] == "loop"]
+        self.assertEqual((int(first), int(last)), (loops[0], loops[-1]))
 
     @unittest.skipIf(QUICK, "too few frames")
     def test_the_world_is_recognised(self):

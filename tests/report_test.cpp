@@ -39,7 +39,8 @@ class ReportTest : public test::ScratchTest {
                 .similarity = 0.5,
                 .matches = 40,
                 .inliers = 31,
-                .times = {1.0, 0.25, 8.0, 9.0}});
+                .times = {1.0, 0.25, 8.0, 9.0},
+                .name = "2.png"});
     folder.add({.frame = 3, .status = Status::low_score, .match = 0, .score = 11.0});
     EvidenceWriter evidence(folder.evidence_path());
     test::Random random;
@@ -106,6 +107,8 @@ TEST_F(ReportTest, SaysWhatTheRunFolderDoes) {
   EXPECT_EQ(json["score"], Json::parse("[0.0, 4.0, 30.0, 11.0]"));
   EXPECT_EQ(json["status_names"][json["status"][2].get<std::size_t>()], "loop");
   EXPECT_EQ(json["inliers"][2], 31);
+  EXPECT_EQ(json["names"], Json::parse(R"(["", "", "2.png", ""])"));
+  EXPECT_EQ(json["revisits"], Json::parse(R"([{"query": [2, 2], "match": [0, 0], "loops": 1}])"));
   EXPECT_EQ(json["times_ms"]["features"][2], 8.0);
   EXPECT_EQ(json["threshold"], LoopDetectorOptions{}.decision.min_score);
   EXPECT_EQ(json["evaluation"]["recall"], 0.5);

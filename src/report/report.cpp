@@ -16,6 +16,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/evidence_file.hpp"
 #include "loopbit/loop_detector_options.hpp"
+#include "loopbit/revisits.hpp"
 #include "loopbit/version.hpp"
 #include "loopbit/write_file.hpp"
 
@@ -224,6 +225,28 @@ void add_match_columns(Json& json, const MatchList& list, int frames) {
   }
 }
 
+/// Of the images, by the first run that knows them: all runs are on the same images. Null if none.
+Json names_of(int frames, const std::vector<ReportRun>& runs) {
+  for (const ReportRun& run : runs) {
+    if (!run.run || run.run->detections.size() != static_cast<std::size_t>(frames)) continue;
+    const auto& detections = run.run->detections;
+    const auto has_name = [](const Detection& d) { return !d.name.empty(); };
+    if (std::none_of(detections.begin(), detections.end(), has_name)) continue;
+    return column(detections, [](const Detection& d) { return d.name; });
+  }
+  return nullptr;
+}
+
+Json revisits_json(const MatchList& list) {
+  Json json = Json::array();
+  for (const Revisit& one : revisits(list)) {
+    json.push_back({{"query", {one.first_query, one.last_query}},
+                    {"match", {one.first_match, one.last_match}},
+                    {"loops", one.loops}});
+  }
+  return json;
+}
+
 /// The two axes with the largest extent of the positions.
 std::array<int, 2> plane(const std::vector<std::optional<cv::Vec3d>>& positions_m) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -312,6 +335,8 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
                      {"near_place", flat(truth->near_place)},
                      {"source", source_of(*run.truth, runs)}};
   }
+  json["names"] = names_of(frames, runs);
+  json["revisits"] = revisits_json(run.list);
   json["evaluation"] = evaluation_json(run);
   json["positions"] = positions(run.positions_m, frames);
   json["similarity_matrix"] = nullptr;
