@@ -4,6 +4,7 @@
 """The loopbit command as a user meets it: what it writes, says and exits with."""
 
 import contextlib
+import fcntl
 import json
 import os
 import pathlib
@@ -16,6 +17,7 @@ import sqlite3
 import struct
 import subprocess
 import tempfile
+import termios
 import time
 import unittest
 import zlib
@@ -24,7 +26,7 @@ from loopbit_command import (FRAMES, LOOPBIT, QUICK, WORLD, CommandTest, complai
                              loopbit, rows)
 
 HEADER = (
-    "frame,timestamp,status,match,score,similarity,matches,inliers,"
+    "frame,timestamp,status,match,score,similarity,matches,inliers,name,match_name,"
     "content_ms,retrieval_ms,features_ms,verification_ms"
 )
 
@@ -46,6 +48,18 @@ class CommandLineTest(CommandTest):
             self.assertEqual(row["match"] == "",
                              row["status"] in ("no_earlier_place", "no_similar_place"), row)
             self.assertGreaterEqual(int(row["matches"]), int(row["inliers"]))
+
+    def test_rows_name_their_image_and_that_of_the_match(self):
+        images = sorted(path.name for path in self.images.iterdir())
+        self.assertEqual([row["name"] for row in rows(self.reference)], images)
+        for row in rows(self.reference):
+            self.assertEqual(row["match_name"], images[int(row["match"])] if row["match"] else "")
+
+    @unittest.skipIf(QUICK, "too few frames")
+    def test_loops_in_a_row_are_one_revisit(self):
+        first, last = re.search(r"(\d+)-(\d+) is 0-\d+\n", self.reference_output).groups()
+        loops = [int(row["frame"]) for row in rows(self.reference) if row["status"] == "loop"]
+        self.assertEqual((int(first), int(last)), (loops[0], loops[-1]))
 
     @unittest.skipIf(QUICK, "too few frames")
     def test_the_world_is_recognised(self):
@@ -92,6 +106,31 @@ class CommandLineTest(CommandTest):
         self.assertEqual(ran.returncode, 0, ran.stderr)
         self.assertEqual(len(rows(self.out)), 5)
 
+    def test_a_run_without_out_names_its_folder_after_the_input(self):
+        run = ["run", f"{self.few_images(3)}/", "--no-report"]
+        for folder, flags in (("few_loops", []), ("few_loops_2", []), ("few_loops_3", []),
+                              ("few_loops", ["--overwrite"])):
+            ran = loopbit(*run, *flags, cwd=self.scratch)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            self.assertIn(f"written    {folder}/loops.csv", ran.stdout)
+        self.assertEqual(sorted(path.name for path in self.scratch.glob("few_*")),
+                         ["few_loops", "few_loops_2", "few_loops_3"])
+
+    def test_the_report_opens_in_a_browser(self):
+        browser = self.scratch / "browser"
+        browser.write_text('#!/bin/sh\necho "$1" >"$0.shown"\n')
+        browser.chmod(0o755)
+        environment = {"PATH": "", "BROWSER": str(browser)}
+        run = ["run", self.few_images(3), "--out", self.out, "--open", "--overwrite"]
+        ran = loopbit(*run, environment=environment)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        page = self.out / "report.html"
+        self.assertEqual((self.scratch / "browser.shown").read_text(), f"{page}\n")
+        environment["BROWSER"] = str(self.scratch / "none")
+        self.assert_fails(loopbit(*run, environment=environment), 4, page, "by hand")
+        unseen = loopbit(*run, "--no-report")
+        self.assertEqual((unseen.returncode, "--open" in unseen.stderr), (2, True))
+
     def test_settings_from_file_and_by_name(self):
         config = self.scratch / "settings.json"
         config.write_text('{"decision": {"min_score": 1000.0}, // nothing passes\n'
@@ -111,14 +150,15 @@ class CommandLineTest(CommandTest):
         self.assertEqual(json.loads((self.out / "run.json").read_text())["options"],
                          json.loads(config.read_text()))
 
-    def test_progress_is_a_bar_on_a_terminal(self):
+    def on_terminal(self, columns, stream, *arguments):
+        """What the command shows on a terminal of this width that is its stdout or stderr."""
         try:
             leader, follower = pty.openpty()
         except OSError as error:
             self.skipTest(f"no terminal here: {error}")
-        subprocess.run([LOOPBIT, "run", self.images, "--out", self.out, "--limit", "40"],
-                       check=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                       stderr=follower)
+        fcntl.ioctl(follower, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        streams = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, stream: follower}
+        subprocess.run([LOOPBIT, *arguments], check=True, stdin=subprocess.DEVNULL, **streams)
         os.close(follower)
         shown = b""
         try:
@@ -127,9 +167,26 @@ class CommandLineTest(CommandTest):
         except OSError:  # all was read
             pass
         os.close(leader)
-        self.assertRegex(shown.decode(), r"\[#+\.*\] \d+ of 40 frames, [\d.]+ frames/s, "
-                                         r"\d+:\d\d left, \d+ loops?")
-        self.assertTrue(shown.endswith(b"\r\x1b[K"), "the bar is left")
+        return shown.decode()
+
+    def test_progress_is_a_bar_on_a_terminal(self):
+        shown = self.on_terminal(80, "stderr", "run", self.images, "--out", self.out, "--limit", "40")
+        self.assertRegex(shown, r"\[#+\.*\] \d+ of 40 frames, [\d.]+ frames/s, "
+                                r"\d+:\d\d left, \d+ loops?")
+        self.assertTrue(shown.endswith("\r\x1b[K"), "the bar is left")
+
+    def test_progress_and_help_fit_the_terminal(self):
+        for columns in (60, 80):
+            with self.subTest(columns=columns):
+                shown = self.on_terminal(columns, "stderr", "run", self.images, "--out",
+                                         self.scratch / str(columns), "--limit", "40")
+                lines = shown.split("\r\x1b[K")
+                self.assertLess(max(map(len, lines)), columns, lines)
+                self.assertRegex(shown, r"\d+ of 40 frames")
+                for command in ([], ["run"], ["map", "merge"]):
+                    lines = self.on_terminal(columns, "stdout", *command, "--help").splitlines()
+                    long = [line for line in lines if len(line) > columns and "Usage" not in line]
+                    self.assertEqual(long, [])
 
     def test_help_names_every_command_and_exit_code(self):
         text = loopbit("--help").stdout
@@ -553,7 +610,7 @@ class CommandLineTest(CommandTest):
         self.assert_fails(missing, 3, "/nowhere.json")
 
     def test_bad_command_lines(self):
-        for arguments in ([], ["walk"], ["run"], ["run", self.images], ["demo", "--frames", "x"],
+        for arguments in ([], ["walk"], ["run"], ["demo", "--frames", "x"],
                           ["run", self.images, "--out", self.out, "--every", "0"]):
             with self.subTest(arguments):
                 ran = loopbit(*arguments)

@@ -48,8 +48,9 @@ def rows(folder):
 
 
 def decisions(folder):
-    """loops.csv without the times, which differ from run to run."""
-    return [{k: v for k, v in row.items() if not k.endswith("_ms")} for row in rows(folder)]
+    """loops.csv without times, which differ from run to run, and names, which inputs choose."""
+    return [{k: v for k, v in row.items() if not k.endswith(("_ms", "name"))}
+            for row in rows(folder)]
 
 
 class CommandTest(unittest.TestCase):

@@ -140,9 +140,6 @@ class MapCommandTest(CommandTest):
         self.assertEqual(loopbit("map", "check", town).returncode, 0)
         self.assertEqual(loopbit("map", "check", other).returncode, 0)
 
-    def test_neither_folder_nor_map_is_an_error(self):
-        self.assert_fails(loopbit("run", self.laps[0]), 2, "--out", "--map")
-
     def test_other_settings_are_refused_before_anything_is_written(self):
         ran = loopbit("run", self.laps[0], "--map", self.map, "--out", self.out, "--set",
                       "surf.max_keypoints=100")

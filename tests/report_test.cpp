@@ -39,7 +39,8 @@ class ReportTest : public test::ScratchTest {
                 .similarity = 0.5,
                 .matches = 40,
                 .inliers = 31,
-                .times = {1.0, 0.25, 8.0, 9.0}});
+                .times = {1.0, 0.25, 8.0, 9.0},
+                .name = "2.png"});
     folder.add({.frame = 3, .status = Status::low_score, .match = 0, .score = 11.0});
     EvidenceWriter evidence(folder.evidence_path());
     test::Random random;
@@ -66,6 +67,35 @@ class ReportTest : public test::ScratchTest {
     run.positions_m = run.run->positions_m;
     return run;
   }
+
+  /// Every third frame from 102 on is a loop with the frame 100 before, which is right except at
+  /// 270. Scores rise.
+  [[nodiscard]] ReportRun run_of_loops(const std::string& name, int frames) const {
+    RunFolder folder(path(name), false);
+    EvidenceWriter evidence(folder.evidence_path());
+    GroundTruth truth;
+    test::Random random;
+    const cv::Mat image = test::view(0);
+    for (int frame = 0; frame < frames; ++frame) {
+      Detection detection{.frame = frame};
+      if (frame >= 102 && frame % 3 == 0) {
+        detection.status = Status::loop;
+        detection.match = frame - 100;
+        detection.score = frame;
+        if (frame != 270) truth.same_place.push_back({frame, frame - 100, frame - 100});
+      }
+      folder.add(detection);
+      evidence.add(frame, image, {test::random_content(random, 0.2), cv::Mat1f(64, 64, 1.0F), {}});
+    }
+    evidence.finish();
+    folder.write_truth(truth);
+    folder.write_record({});
+    ReportRun run;
+    run.run = read_run(path(name));
+    run.list = match_list(run.run->detections);
+    run.truth = run.run->truth;
+    return run;
+  }
 };
 
 TEST_F(ReportTest, SaysWhatTheRunFolderDoes) {
@@ -77,6 +107,8 @@ TEST_F(ReportTest, SaysWhatTheRunFolderDoes) {
   EXPECT_EQ(json["score"], Json::parse("[0.0, 4.0, 30.0, 11.0]"));
   EXPECT_EQ(json["status_names"][json["status"][2].get<std::size_t>()], "loop");
   EXPECT_EQ(json["inliers"][2], 31);
+  EXPECT_EQ(json["names"], Json::parse(R"(["", "", "2.png", ""])"));
+  EXPECT_EQ(json["revisits"], Json::parse(R"([{"query": [2, 2], "match": [0, 0], "loops": 1}])"));
   EXPECT_EQ(json["times_ms"]["features"][2], 8.0);
   EXPECT_EQ(json["threshold"], LoopDetectorOptions{}.decision.min_score);
   EXPECT_EQ(json["evaluation"]["recall"], 0.5);
@@ -105,6 +137,27 @@ TEST_F(ReportTest, PicturesKeepToTheBudget) {
   EXPECT_GE(some.size(), 1U);
   EXPECT_LT(some.size(), 4U);
   EXPECT_LE(some.dump().size(), 5 * one / 2 + 100);
+}
+
+TEST_F(ReportTest, TheFirstPairWrongAndWeakLoopsHavePicturesBeforeOthers) {
+  // 300 frames: a loop every third frame, stronger with the number, with one that is wrong.
+  ReportRun run = run_of_loops("run", 300);
+  const auto report = [&](double mb) {
+    return Json::parse(report_json({run}, {.max_pictures_mb = mb}))["runs"][0];
+  };
+  const double one = static_cast<double>(report(100.0)["pictures"]["299"].dump().size());
+  const Json json = report(1e-6 * 100 * one);
+  const auto has_pair = [&](std::size_t frame) {
+    const Json& pictures = json["pictures"];
+    return pictures.contains(std::to_string(frame)) &&
+           pictures.contains(std::to_string(json["match"][frame].get<int>()));
+  };
+  EXPECT_EQ(json["first_frame"], 270);
+  EXPECT_EQ(json["verdict"][270], "wrong");
+  EXPECT_TRUE(has_pair(270));
+  for (std::size_t frame = 102; frame < 180; frame += 3) EXPECT_TRUE(has_pair(frame)) << frame;
+  run.truth.reset();
+  EXPECT_EQ(report(0)["first_frame"], 297);
 }
 
 TEST_F(ReportTest, MoreFramesThanAPageShowsAreRefused) {

@@ -39,7 +39,8 @@ class RunFolderTest : public test::ScratchTest {};
 
 TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
   RunFolder folder(path("run"), false);
-  folder.add({.frame = 0, .timestamp_s = 12.5, .status = Status::no_earlier_place});
+  folder.add(
+      {.frame = 0, .timestamp_s = 12.5, .status = Status::no_earlier_place, .name = "0.png"});
   folder.add({.frame = 1,
               .status = Status::loop,
               .match = 0,
@@ -47,12 +48,16 @@ TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
               .similarity = 0.25,
               .matches = 30,
               .inliers = 21,
-              .times = {1.0, 0.5, 12.25, 3.0}});
-  EXPECT_EQ(
-      lines_of(path("run/loops.csv")),
-      (std::vector<std::string>{
-          kLoopsHeader, "0,12.500000,no_earlier_place,,0,0.000000,0,0,0.000,0.000,0.000,0.000",
-          "1,,loop,0,20.5,0.250000,30,21,1.000,0.500,12.250,3.000"}));
+              .times = {1.0, 0.5, 12.25, 3.0},
+              .name = "left, \"new\"\n/1.png"});
+  EXPECT_EQ(lines_of(path("run/loops.csv")),
+            (std::vector<std::string>{
+                kLoopsHeader,
+                "0,12.500000,no_earlier_place,,0,0.000000,0,0,0.png,,0.000,0.000,0.000,0.000",
+                R"(1,,loop,0,20.5,0.250000,30,21,left\x2c \x22new\x22\x0a/1.png,0.png,)"
+                "1.000,0.500,12.250,3.000"}));
+  EXPECT_EQ(read_detections(path("run/loops.csv"))[0].name, "0.png");
+  EXPECT_EQ(read_match_list(path("run/loops.csv")).matches.size(), 1U);
 }
 
 TEST_F(RunFolderTest, NeverReplacesARunUnasked) {
@@ -245,15 +250,15 @@ TEST_F(RunFolderTest, AChangedRowIsNamed) {
     test::expect_error(ErrorKind::input, {file, "line 2", part},
                        [&] { (void)read_detections(file); });
   };
-  expect_refused("0,,loop,0,1,0,0,0,0,0,0", "11 columns");
-  expect_refused("0,,maybe,0,1,0,0,0,0,0,0,0", "'maybe'");
-  expect_refused("0,,loop,x,1,0,0,0,0,0,0,0", "'x'");
-  expect_refused("1,,loop,0,1,0,0,0,0,0,0,0", "'1'");
-  expect_refused("0,,loop,-7,1,0,0,0,0,0,0,0", "'-7'");
-  expect_refused("0,,loop,0,nan,0,0,0,0,0,0,0", "'nan'");
-  expect_refused("0,,loop,0,1,inf,0,0,0,0,0,0", "'inf'");
+  expect_refused("0,,loop,0,1,0,0,0,,,0,0,0", "13 columns");
+  expect_refused("0,,maybe,0,1,0,0,0,,,0,0,0,0", "'maybe'");
+  expect_refused("0,,loop,x,1,0,0,0,,,0,0,0,0", "'x'");
+  expect_refused("1,,loop,0,1,0,0,0,,,0,0,0,0", "'1'");
+  expect_refused("0,,loop,-7,1,0,0,0,,,0,0,0,0", "'-7'");
+  expect_refused("0,,loop,0,nan,0,0,0,,,0,0,0,0", "'nan'");
+  expect_refused("0,,loop,0,1,inf,0,0,,,0,0,0,0", "'inf'");
   const std::string carried =
-      write("loops.csv", std::string(kLoopsHeader) + "\r\n0,,loop,0,1,0,0,0,0,0,0,0\r\n");
+      write("loops.csv", std::string(kLoopsHeader) + "\r\n0,,loop,0,1,0,0,0,,,0,0,0,0\r\n");
   EXPECT_EQ(read_detections(carried).size(), 1U);
   test::expect_error(ErrorKind::input, {path("none"), "loops.csv"},
                      [&] { (void)read_run(path("none")); });

@@ -4,6 +4,10 @@
 
 import os
 import re
+import sys
+
+sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
+import mend_furo  # noqa: E402
 
 project = "loopbit"
 author = "The loopbit authors"
@@ -41,3 +45,4 @@ def without_self(app, what, name, obj, options, signature, returned):
 def setup(app):
     app.connect("autodoc-process-signature", without_self)
     app.connect("autodoc-process-docstring", escape)
+    app.connect("build-finished", mend_furo.mend)

@@ -36,6 +36,8 @@ _DETECTION = numpy.dtype(
         ("similarity", "f8"),
         ("matches", "i4"),
         ("inliers", "i4"),
+        ("name", object),
+        ("match_name", object),
         ("content_ms", "f8"),
         ("retrieval_ms", "f8"),
         ("features_ms", "f8"),
@@ -48,8 +50,11 @@ def detections_array(detections: Iterable[Detection]) -> numpy.typing.NDArray[An
     """Converts detections to a structured array with the columns of loops.csv.
 
     A match with an earlier session of a map has two columns, earlier_session and earlier_frame.
-    Missing values are nan in timestamp_s, -1 in match and earlier_frame, 0 in earlier_session.
+    Missing values are nan in timestamp_s, -1 in match and earlier_frame, 0 in earlier_session, and
+    empty in name and match_name.
     """
+    detections = list(detections)
+    names = {d.frame: d.name for d in detections}
     rows = [
         (
             d.frame,
@@ -62,6 +67,8 @@ def detections_array(detections: Iterable[Detection]) -> numpy.typing.NDArray[An
             d.similarity,
             d.matches,
             d.inliers,
+            d.name,
+            "" if d.match is None else names.get(d.match, ""),
             d.times.content_ms,
             d.times.retrieval_ms,
             d.times.features_ms,

@@ -102,6 +102,8 @@ void bind_detection(py::module_& module) {
       .def_readonly("inliers", &Detection::inliers,
                     "Number of matches that fit one epipolar geometry.")
       .def_readonly("times", &Detection::times, "The time of each step.")
+      .def_property_readonly("name", text_of(&Detection::name),
+                             "The name of the image in its source; empty without a source.")
       .def_property_readonly(
           "is_loop", [](const Detection& self) { return self.status == Status::loop; },
           "Whether the match is accepted.")

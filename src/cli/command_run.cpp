@@ -1,9 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <filesystem>
 #include <memory>
+#include <system_error>
 #include <utility>
 
-#include "loopbit/error.hpp"
+#include <fmt/format.h>
 
 #include "commands.hpp"
 #include "session.hpp"
@@ -11,6 +14,8 @@
 
 namespace loopbit::cli {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct RunFlags {
   SessionFlags session;
@@ -20,11 +25,24 @@ struct RunFlags {
   TruthFlags truth;
 };
 
+/// "images_loops" in the working folder for a folder "images" anywhere; with a new number if that
+/// exists and must stay.
+std::string usual_folder(const RunFlags& flags) {
+  const fs::path input = fs::absolute(flags.input).lexically_normal();
+  const fs::path last = input.has_filename() ? input : input.parent_path();
+  std::error_code error;
+  std::string name = (fs::is_directory(last, error) ? last.filename() : last.stem()).string();
+  std::replace(name.begin(), name.end(), ':', '_');  // of camera:0
+  std::string folder = name + "_loops";
+  for (int number = 2; !flags.session.run.overwrite && fs::exists(folder, error); ++number) {
+    folder = fmt::format("{}_loops_{}", name, number);
+  }
+  return folder;
+}
+
 int run_command(RunFlags& flags, const Arguments& arguments) {
   RunRequest& run = flags.session.run;
-  if (run.folder.empty() && run.map.empty()) {
-    throw Error(ErrorKind::option, "The run has no output; add --out DIR, --map MAP.db, or both.");
-  }
+  if (run.folder.empty() && run.map.empty()) run.folder = usual_folder(flags);
   run.arguments = arguments;
   run.scoring = flags.truth.scoring;
   run.poses = flags.truth.poses;
@@ -45,7 +63,8 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   command
       ->add_option(
           "--out", flags->session.run.folder,
-          "Folder for loops.csv, run.json and report.html; default with --map: MAP_session_N")
+          "Folder for loops.csv, run.json and report.html; default: INPUT_loops, with a new number "
+          "if that exists; with --map: MAP_session_N")
       ->type_name("DIR");
   flags->session.add_to(*command);
   command->add_option("--every", flags->sampling.every, "Read only every N-th frame")

@@ -5,13 +5,16 @@
 #include <cstdio>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <opencv2/core/utils/logger.hpp>
+#include <unistd.h>
 
 #include "loopbit/error.hpp"
 #include "loopbit/version.hpp"
@@ -26,7 +29,41 @@ namespace cli = loopbit::cli;
 
 constexpr const char* kFooter =
     "Exit codes: 0 success; 1 internal error; 2 invalid option or setting; 3 input missing or "
-    "unreadable;\n4 output cannot be written; 130 interrupted, results so far are kept.";
+    "unreadable; 4 output cannot be written; 130 interrupted, results so far are kept.";
+
+/// Column of the text that explains what a line of help begins with, after two or more spaces; the
+/// line's own indent if there is none.
+std::size_t hanging_indent(const std::string& line, std::size_t width) {
+  const std::size_t begin = line.find_first_not_of(' ');
+  if (begin == std::string::npos) return 0;
+  const std::size_t gap = line.find("  ", begin);
+  const std::size_t text = gap == std::string::npos ? gap : line.find_first_not_of(' ', gap);
+  return text <= width / 2 ? text : begin;
+}
+
+/// CLI11's help, with lines broken between words where the terminal ends.
+class Help : public CLI::Formatter {
+ public:
+  std::string make_help(const CLI::App* app, std::string name,
+                        CLI::AppFormatMode mode) const override {
+    constexpr std::size_t kLeast = 60;
+    constexpr std::size_t kMost = 100;
+    const std::size_t width = std::clamp(cli::terminal_columns(STDOUT_FILENO), kLeast, kMost);
+    std::istringstream lines(CLI::Formatter::make_help(app, std::move(name), mode));
+    std::string text;
+    for (std::string line; std::getline(lines, line);) {
+      const std::size_t indent = hanging_indent(line, width);
+      while (line.size() > width) {
+        const std::size_t end = line.rfind(' ', width);
+        if (end == std::string::npos || end <= indent) break;
+        text += line.substr(0, end) + '\n';
+        line = std::string(indent, ' ') + line.substr(end + 1);
+      }
+      text += line + '\n';
+    }
+    return text;
+  }
+};
 
 int exit_code_of(ErrorKind kind) {
   switch (kind) {
@@ -60,6 +97,7 @@ void check_command(const CLI::App& app, const std::string& name, int at, int arg
 int run_command_line(int argc, char** argv) {
   CLI::App app{
       "loopbit detects visual loop closures: whether a camera is back at an earlier place."};
+  app.formatter(std::make_shared<Help>());
   app.footer(kFooter);
   app.set_version_flag("--version", loopbit::kVersion);
   app.require_subcommand(1);

@@ -7,12 +7,14 @@
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <iostream>
 #include <mutex>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
+#include <sys/ioctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -52,6 +54,16 @@ extern "C" void tell_heard(int signal) {
 
 #endif
 
+/// Whether the program, which is searched in PATH, ends well with this argument.
+bool starts(std::string program, std::string argument) {
+  std::array<char*, 3> arguments{program.data(), argument.data(), nullptr};
+  pid_t process = 0;
+  int status = 0;
+  return posix_spawnp(&process, program.c_str(), nullptr, nullptr, arguments.data(), environ) ==
+             0 &&
+         waitpid(process, &status, 0) == process && status == 0;
+}
+
 std::atomic<bool> signal_arrived{false};
 static_assert(std::atomic<bool>::is_always_lock_free, "set by a signal handler");
 
@@ -89,6 +101,13 @@ void tell(const std::string& text) {
   (void)std::fflush(kOwnStderr);
 }
 
+std::size_t terminal_columns(int stream) {
+  constexpr std::size_t kUsual = 80;
+  winsize size{};
+  const bool is_known = ioctl(stream, TIOCGWINSZ, &size) == 0 && size.ws_col > 0;
+  return is_known ? size.ws_col : kUsual;
+}
+
 void clear_terminal_line() {
   (void)std::fputs("\r\033[K", kOwnStderr);
   (void)std::fflush(kOwnStderr);
@@ -109,19 +128,12 @@ const std::atomic<bool>& stop_on_signal() {
 }
 
 void open_page(const std::string& path) {
-  std::string program = "xdg-open";
-  std::string argument = path;
-  std::array<char*, 3> arguments{program.data(), argument.data(), nullptr};
-  pid_t process = 0;
-  int status = 0;
-  const bool started =
-      posix_spawnp(&process, program.c_str(), nullptr, nullptr, arguments.data(), environ) == 0;
-  if (!started || waitpid(process, &status, 0) != process || status != 0) {
-    throw Error(ErrorKind::output,
-                fmt::format("'{}' is written, but no browser could be opened by xdg-open; open it "
-                            "by hand.",
-                            path));
-  }
+  const char* const browser = std::getenv("BROWSER");
+  if (starts("xdg-open", path) || (browser && starts(browser, path))) return;
+  throw Error(ErrorKind::output,
+              fmt::format("'{}' is written, but neither xdg-open nor $BROWSER could show it; open "
+                          "it by hand.",
+                          path));
 }
 
 }  // namespace loopbit::cli

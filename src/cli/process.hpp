@@ -3,6 +3,7 @@
 #pragma once
 
 #include <atomic>
+#include <cstddef>
 #include <string>
 
 namespace loopbit::cli {
@@ -18,6 +19,9 @@ void keep_libraries_quiet();
 /// stderr itself are ignored.
 void tell(const std::string& text);
 
+/// Width of the terminal that `stream` is; 80 if it is none.
+std::size_t terminal_columns(int stream);
+
 /// Erases the current line of a terminal that is stderr.
 void clear_terminal_line();
 
@@ -28,7 +32,8 @@ void flush_stdout();
 /// process. SIGHUP stays ignored if it was.
 const std::atomic<bool>& stop_on_signal();
 
-/// Opens a file in the user's browser with xdg-open. Throws Error (kind output) if that fails.
+/// Opens a file with xdg-open, or else in the program that $BROWSER names. Throws Error (kind
+/// output) if neither works.
 void open_page(const std::string& path);
 
 }  // namespace loopbit::cli

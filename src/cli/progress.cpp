@@ -3,6 +3,7 @@
 #include "progress.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -58,21 +59,33 @@ void Progress::report(const std::string& sentence) {
 std::string Progress::line() const {
   const double elapsed_s = duration<double>(Clock::now() - start_).count();
   const double rate = static_cast<double>(frames_) / std::max(elapsed_s, 1e-9);
-  std::string text = on_terminal_ ? bar() : "";
-  text +=
+  std::array<std::string, 4> facts;
+  auto& [count, speed, left, loops] = facts;
+  count =
       total_ ? fmt::format("{} of {} frames", frames_, *total_) : fmt::format("{} frames", frames_);
-  text += fmt::format(", {:.1f} frames/s", rate);
+  speed = fmt::format(", {:.1f} frames/s", rate);
   if (total_ && *total_ >= frames_) {
-    text += fmt::format(", {} left", clock_time(static_cast<double>(*total_ - frames_) / rate));
+    left = fmt::format(", {} left", clock_time(static_cast<double>(*total_ - frames_) / rate));
   }
-  if (of_detection_) text += fmt::format(", {} loop{}", loops_, loops_ == 1 ? "" : "s");
-  return text;
+  if (of_detection_) loops = fmt::format(", {} loop{}", loops_, loops_ == 1 ? "" : "s");
+  if (!on_terminal_) return fmt::format("{}", fmt::join(facts, ""));
+
+  // One less than fits, because some terminals wrap a full line.
+  const std::size_t room = terminal_columns(STDERR_FILENO) - 1;
+  for (std::string* fact : {&speed, &loops, &left}) {
+    if (fmt::format("{}", fmt::join(facts, "")).size() > room) fact->clear();
+  }
+  const std::string text = fmt::format("{}", fmt::join(facts, ""));
+  return bar(room - std::min(room, text.size())) + text;
 }
 
-std::string Progress::bar() const {
-  if (!total_ || *total_ == 0) return "";
-  const std::size_t full = std::min(kBarWidth, frames_ * kBarWidth / *total_);
-  return fmt::format("[{}{}] ", std::string(full, '#'), std::string(kBarWidth - full, '.'));
+std::string Progress::bar(std::size_t room) const {
+  constexpr std::size_t kAround = 3;  // brackets and a space
+  constexpr std::size_t kLeastWidth = 6;
+  if (!total_ || *total_ == 0 || room < kLeastWidth + kAround) return "";
+  const std::size_t width = std::min(kBarWidth, room - kAround);
+  const std::size_t full = std::min(width, frames_ * width / *total_);
+  return fmt::format("[{}{}] ", std::string(full, '#'), std::string(width - full, '.'));
 }
 
 void Progress::clear_line() const {

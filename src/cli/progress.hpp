@@ -31,7 +31,7 @@ class Progress {
   using Clock = std::chrono::steady_clock;
 
   [[nodiscard]] std::string line() const;
-  [[nodiscard]] std::string bar() const;
+  [[nodiscard]] std::string bar(std::size_t room) const;
   void clear_line() const;
 
   const std::optional<std::size_t> total_;

@@ -64,9 +64,10 @@ void SessionFlags::add_to(CLI::App& command) {
                   "Threads, at most one per core; 0 = one per core. Results do not depend on it")
       ->type_name("N")
       ->check(whole_number(0, 1024));
-  command.add_flag_callback(
+  CLI::Option* left_out = command.add_flag_callback(
       "--no-report", [this] { run.evidence = false; },
       "Store no pictures and write no report.html");
+  command.add_flag("--open", open, "Open the report in the browser")->excludes(left_out);
   add_report_flag(command, report);
 }
 
@@ -126,6 +127,7 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   const bool is_cut_off = outcome.record.stopped_by != "end";
   if (outcome.fault && !is_cut_off) throw Error(*outcome.fault);
   if (outcome.fault) tell(fmt::format("loopbit: {}\n", outcome.fault->what()));
+  if (flags.open && !is_cut_off) open_page(report);
   return is_cut_off ? interrupted : success;
 }
 

@@ -8,6 +8,7 @@
 
 #include "loopbit/finished_run.hpp"
 #include "loopbit/printable.hpp"
+#include "loopbit/revisits.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -30,6 +31,25 @@ void print_reasons(const std::vector<Detection>& detections) {
   for (const auto& [status, meaning] : kReasons) {
     const auto frames = count(detections, status);
     if (frames > 0) fmt::print("  {:>9} {} ({})\n", frames, meaning, to_string(status));
+  }
+}
+
+/// "300-410 is 46-150", the longest ones.
+void print_revisits(const std::vector<Detection>& detections) {
+  constexpr std::size_t kShown = 5;
+  std::vector<Revisit> groups = revisits(match_list(detections));
+  std::stable_sort(groups.begin(), groups.end(),
+                   [](const Revisit& a, const Revisit& b) { return a.loops > b.loops; });
+  const auto span = [](int first, int last) {
+    return first == last ? fmt::format("{}", first) : fmt::format("{}-{}", first, last);
+  };
+  for (std::size_t i = 0; i < std::min(groups.size(), kShown); ++i) {
+    const Revisit& one = groups[i];
+    fmt::print("  {:>9} in a row: {} is {}\n", one.loops, span(one.first_query, one.last_query),
+               span(one.first_match, one.last_match));
+  }
+  if (groups.size() > kShown) {
+    fmt::print("            and {} shorter revisits\n", groups.size() - kShown);
   }
 }
 
@@ -68,6 +88,7 @@ void print_summary(const RunOutcome& run, const std::string& report) {
   const auto elsewhere = match_list(detections).elsewhere.size();
   fmt::print("loops      {} frame{} at a place seen before{}\n", loops, loops == 1 ? "" : "s",
              elsewhere == 0 ? "" : fmt::format(", {} in earlier sessions of the map", elsewhere));
+  print_revisits(detections);
   print_reasons(detections);
   if (record.score) print_score(record.score->decision);
   print_times(record, detections);

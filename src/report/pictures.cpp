@@ -3,6 +3,7 @@
 #include "pictures.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <numeric>
@@ -36,7 +37,23 @@ std::vector<std::size_t> spread_order(std::size_t n) {
   return order;
 }
 
-/// The frames in order of priority for a picture.
+bool is_loop(const FrameView& view) { return std::isfinite(view.loop_score); }
+
+/// The frames with the lowest scores among the loops of this run.
+std::vector<const FrameView*> weakest_loops(const std::vector<FrameView>& frames) {
+  constexpr std::size_t kWeakest = 100;
+  std::vector<const FrameView*> loops;
+  for (const FrameView& view : frames) {
+    if (is_loop(view)) loops.push_back(&view);
+  }
+  std::stable_sort(loops.begin(), loops.end(), [](const FrameView* a, const FrameView* b) {
+    return a->loop_score < b->loop_score;
+  });
+  loops.resize(std::min(loops.size(), kWeakest));
+  return loops;
+}
+
+/// Every frame once: verdicts take turns, frames of a verdict spread evenly over the run.
 std::vector<const FrameView*> by_turns(const std::vector<FrameView>& frames) {
   std::map<std::string, std::vector<const FrameView*>> groups;
   for (const FrameView& view : frames) groups[view.verdict].push_back(&view);
@@ -58,6 +75,20 @@ std::vector<const FrameView*> by_turns(const std::vector<FrameView>& frames) {
   return order;
 }
 
+/// The frames in order of priority for a picture; the first ones come again later.
+std::vector<const FrameView*> by_priority(const std::vector<FrameView>& frames) {
+  std::vector<const FrameView*> order;
+  if (frames.empty()) return order;
+  order.push_back(&frames[static_cast<std::size_t>(first_frame(frames))]);
+  for (const FrameView& view : frames) {
+    if (view.verdict == "wrong") order.push_back(&view);
+  }
+  for (const auto& others : {weakest_loops(frames), by_turns(frames)}) {
+    order.insert(order.end(), others.begin(), others.end());
+  }
+  return order;
+}
+
 Json picture(const StoredEvidence& evidence) {
   return {{"jpeg", base64(evidence.picture_jpeg)},
           {"saliency", base64(evidence.saliency_png)},
@@ -74,6 +105,20 @@ std::size_t size_of(const Json& picture) {
 }
 
 }  // namespace
+
+int first_frame(const std::vector<FrameView>& frames) {
+  const auto first = [&](const char* verdict) {
+    return std::find_if(frames.begin(), frames.end(),
+                        [&](const FrameView& view) { return view.verdict == verdict; });
+  };
+  if (const auto wrong = first("wrong"); wrong != frames.end()) return wrong->frame;
+  const auto best = std::max_element(
+      frames.begin(), frames.end(),
+      [](const FrameView& a, const FrameView& b) { return a.loop_score < b.loop_score; });
+  if (best != frames.end() && is_loop(*best)) return best->frame;
+  const auto missed = first("missed");
+  return missed == frames.end() ? 0 : missed->frame;
+}
 
 Json pictures(const std::vector<FrameView>& frames, const EvidenceReader& evidence,
               std::size_t max_bytes) {
@@ -93,7 +138,7 @@ Json pictures(const std::vector<FrameView>& frames, const EvidenceReader& eviden
   const auto add_with_partners = [&](const FrameView& view) {
     return add(view.frame) && std::all_of(view.partners.begin(), view.partners.end(), add);
   };
-  for (const FrameView* view : by_turns(frames)) {
+  for (const FrameView* view : by_priority(frames)) {
     if (!add_with_partners(*view)) break;
   }
   for (auto& [frame, json] : by_frame) chosen[std::to_string(frame)] = std::move(json);

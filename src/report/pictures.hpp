@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,11 +17,17 @@ namespace loopbit::report {
 struct FrameView {
   int frame = 0;
   std::string verdict;
-  std::vector<int> partners;  ///< frames shown beside it: its match, a true place
+  std::vector<int> partners = {};  ///< frames shown beside it: its match, a true place
+  double loop_score = -std::numeric_limits<double>::infinity();  ///< if it is a loop of this run
 };
 
-/// Pictures by frame number, as many as fit into `max_bytes` of JSON. Verdicts take turns; within a
-/// verdict frames are spread evenly over the run. A frame comes together with its partners.
+/// The frame that the page opens on: the first wrong loop, otherwise the loop with the highest
+/// score, the first missed revisit, or 0.
+int first_frame(const std::vector<FrameView>& frames);
+
+/// Pictures by frame number, as many as fit into `max_bytes` of JSON, a frame together with its
+/// partners. First come the first_frame(), wrong loops and the weakest loops. Then verdicts take
+/// turns; within a verdict frames are spread evenly over the run.
 nlohmann::ordered_json pictures(const std::vector<FrameView>& frames,
                                 const EvidenceReader& evidence, std::size_t max_bytes);
 

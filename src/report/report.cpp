@@ -17,6 +17,7 @@
 #include "loopbit/evidence_file.hpp"
 #include "loopbit/judge.hpp"
 #include "loopbit/loop_detector_options.hpp"
+#include "loopbit/revisits.hpp"
 #include "loopbit/version.hpp"
 #include "loopbit/write_file.hpp"
 
@@ -138,8 +139,10 @@ std::vector<FrameView> frame_views(const ReportRun& run, const std::optional<Gro
   for (int frame = 0; frame < frames; ++frame) {
     const ReportedMatch* match = best[static_cast<std::size_t>(frame)];
     const bool is_elsewhere = elsewhere[static_cast<std::size_t>(frame)];
-    FrameView view{frame, verdict_of(frame, match, is_elsewhere, judge ? &*judge : nullptr), {}};
+    FrameView view{.frame = frame,
+                   .verdict = verdict_of(frame, match, is_elsewhere, judge ? &*judge : nullptr)};
     if (match) view.partners.push_back(match->match);
+    if (match && match->is_loop) view.loop_score = match->score;
     if (view.verdict == "missed" || view.verdict == "wrong") {
       if (const auto place = places.find(frame); place != places.end()) {
         view.partners.push_back(place->second);
@@ -224,6 +227,28 @@ void add_match_columns(Json& json, const MatchList& list, int frames) {
   }
 }
 
+/// Of the images, by the first run that knows them: all runs are on the same images. Null if none.
+Json names_of(int frames, const std::vector<ReportRun>& runs) {
+  for (const ReportRun& run : runs) {
+    if (!run.run || run.run->detections.size() != static_cast<std::size_t>(frames)) continue;
+    const auto& detections = run.run->detections;
+    const auto has_name = [](const Detection& d) { return !d.name.empty(); };
+    if (std::none_of(detections.begin(), detections.end(), has_name)) continue;
+    return column(detections, [](const Detection& d) { return d.name; });
+  }
+  return nullptr;
+}
+
+Json revisits_json(const MatchList& list) {
+  Json json = Json::array();
+  for (const Revisit& one : revisits(list)) {
+    json.push_back({{"query", {one.first_query, one.last_query}},
+                    {"match", {one.first_match, one.last_match}},
+                    {"loops", one.loops}});
+  }
+  return json;
+}
+
 /// The two axes with the largest extent of the positions.
 std::array<int, 2> plane(const std::vector<std::optional<cv::Vec3d>>& positions_m) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -305,12 +330,15 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
   add_match_columns(json, run.list, frames);
   json["verdict"] = Json::array();
   for (const FrameView& view : views) json["verdict"].push_back(view.verdict);
+  json["first_frame"] = report::first_frame(views);
   json["truth"] = nullptr;
   if (truth) {
     json["truth"] = {{"same_place", flat(truth->same_place)},
                      {"near_place", flat(truth->near_place)},
                      {"source", source_of(*run.truth, runs)}};
   }
+  json["names"] = names_of(frames, runs);
+  json["revisits"] = revisits_json(run.list);
   json["evaluation"] = evaluation_json(run);
   json["positions"] = positions(run.positions_m, frames);
   json["similarity_matrix"] = nullptr;

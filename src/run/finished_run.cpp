@@ -125,7 +125,7 @@ void read_match(const Row& row, std::size_t column, Detection& detection) {
 }
 
 Detection detection_from(const Row& row) {
-  constexpr std::size_t kColumns = 12;
+  constexpr std::size_t kColumns = 14;
   row.check_columns(kColumns);
   Detection detection{.frame = row.number<PlaceId>(0),
                       .timestamp_s = row.number_if_any<double>(1),
@@ -134,10 +134,11 @@ Detection detection_from(const Row& row) {
                       .similarity = row.number<double>(5),
                       .matches = row.number<int>(6),
                       .inliers = row.number<int>(7),
-                      .times = {.content_ms = row.number<double>(8),
-                                .retrieval_ms = row.number<double>(9),
-                                .features_ms = row.number<double>(10),
-                                .verification_ms = row.number<double>(11)}};
+                      .times = {.content_ms = row.number<double>(10),
+                                .retrieval_ms = row.number<double>(11),
+                                .features_ms = row.number<double>(12),
+                                .verification_ms = row.number<double>(13)},
+                      .name = std::string(row.cell(8))};
   read_match(row, 3, detection);
   return detection;
 }

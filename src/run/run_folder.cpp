@@ -15,6 +15,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/instruction_set.hpp"
+#include "loopbit/printable.hpp"
 #include "loopbit/write_file.hpp"
 
 #include "earlier_run.hpp"
@@ -33,12 +34,29 @@ std::string match_cell(const Detection& d) {
   return d.match ? fmt::format("{}", *d.match) : "";
 }
 
-std::string csv_row(const Detection& d) {
+/// A name that needs no quotes: commas, quotes and control characters become "\x2c" and the like.
+std::string name_cell(const std::string& name) {
+  std::string cell;
+  for (const char c : printable(name)) {
+    if (c == ',' || c == '"') {
+      cell += c == ',' ? "\\x2c" : "\\x22";
+    } else {
+      cell += c;
+    }
+  }
+  return cell;
+}
+
+/// `before`: the detections of the frames before it.
+std::string csv_row(const Detection& d, const std::vector<Detection>& before) {
   const StepTimes& t = d.times;
-  return fmt::format("{},{},{},{},{},{:.6f},{},{},{:.3f},{:.3f},{:.3f},{:.3f}\n", d.frame,
+  const auto match = static_cast<std::size_t>(d.match.value_or(d.frame));
+  const std::string match_name = match < before.size() ? before[match].name : "";
+  return fmt::format("{},{},{},{},{},{:.6f},{},{},{},{},{:.3f},{:.3f},{:.3f},{:.3f}\n", d.frame,
                      d.timestamp_s ? fmt::format("{:.6f}", *d.timestamp_s) : "",
                      to_string(d.status), match_cell(d), d.score, d.similarity, d.matches,
-                     d.inliers, t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
+                     d.inliers, name_cell(d.name), name_cell(match_name), t.content_ms,
+                     t.retrieval_ms, t.features_ms, t.verification_ms);
 }
 
 std::string frame_list(const char* comment, const std::vector<int>& frames) {
@@ -128,7 +146,7 @@ void RunFolder::append(const std::string& row) {
 }
 
 void RunFolder::add(const Detection& detection) {
-  append(csv_row(detection));
+  append(csv_row(detection, detections_));
   detections_.push_back(detection);
   earlier_->leave_aside();
 }

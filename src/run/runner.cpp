@@ -20,9 +20,13 @@ void check_time(const Frame& frame, const LoopDetectorOptions& options) {
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
          const std::atomic<bool>& stop) {
   bool is_first = true;
+  const auto report = [&](Detection detection, const Frame& frame) {
+    detection.name = frame.name;
+    listener.on_detection(detection);
+  };
   const auto leave_out = [&](const Frame& frame, const std::string& reason) {
     listener.on_bad_frame(fmt::format("Frame {}: {}", detector.size(), reason));
-    listener.on_detection(detector.skip(frame.timestamp_s));
+    report(detector.skip(frame.timestamp_s), frame);
   };
   const auto detect = [&](const Frame& frame) {
     if (!frame.error.empty()) return leave_out(frame, frame.error);
@@ -37,7 +41,7 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
       return leave_out(frame, fmt::format("'{}': {}", frame.name, error.what()));
     }
     is_first = false;
-    listener.on_detection(detection);
+    report(detection, frame);
     if (listener.on_evidence) listener.on_evidence(detection, frame.image, evidence);
   };
   for (Frame frame; !stop && source.next(frame);) detect(frame);

@@ -75,13 +75,14 @@ def run(dataset, truth, positions, tmp_path_factory):
 
 
 def decisions(folder):
-    """The rows of a run's loops.csv without the times, which differ from run to run."""
+    """The rows of a run's loops.csv without times, which differ from run to run, and names."""
     with open(pathlib.Path(folder) / "loops.csv", newline="") as file:
-        return [{k: v for k, v in row.items() if k not in TIMES} for row in csv.DictReader(file)]
+        left_out = (*TIMES, "name", "match_name")
+        return [{k: v for k, v in row.items() if k not in left_out} for row in csv.DictReader(file)]
 
 
 def as_row(detection):
-    """A detection as loops.csv has it, without the times."""
+    """A detection as loops.csv has it, without times and names."""
     earlier = detection.earlier_match
     match = f"{earlier.session}:{earlier.frame}" if earlier else detection.match
     return {

@@ -39,6 +39,9 @@ def test_finished_run(run):
     assert len(loops) == sum(d.is_loop for d in run.detections) > 20 and loops["match"].min() >= 0
     assert array["match"][0] == -1 and array["timestamp_s"][10] == pytest.approx(1.0)
     assert {d.status.name for d in run.detections} == set(array["status"])
+    assert run.detections[7].name == array["name"][7] == "000007.png"
+    assert array["match_name"][0] == ""
+    assert loops["match_name"].tolist() == [f"{match:06}.png" for match in loops["match"]]
 
 
 def test_callbacks(dataset, images, tmp_path):
@@ -51,6 +54,7 @@ def test_callbacks(dataset, images, tmp_path):
     found = loopbit.run(folder, on_detection=told.append, on_bad_frame=bad.append)
     assert [d.status.name for d in found] == ["no_earlier_place", "unreadable", "no_earlier_place"]
     assert [d.frame for d in told] == [0, 1, 2] and len(bad) == 1 and "1.png" in bad[0]
+    assert [d.name for d in found] == ["0.png", "1.png", "2.png"]
     with pytest.warns(UserWarning, match="1.png"):
         loopbit.run(folder)
 
@@ -193,7 +197,7 @@ RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views":
            "truth_variable": "variable", "poses": "positions_m", "no_report": "evidence"}
 OF_OPTIONS = {"preset", "config", "set"}
 OF_SOURCE = {"every", "limit", "max_megapixels"}
-OF_THE_COMMAND = {"help", "threads", "pictures_mb"}
+OF_THE_COMMAND = {"help", "threads", "pictures_mb", "open"}
 
 
 def test_run_folder_has_what_the_command_has(command):

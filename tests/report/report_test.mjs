@@ -3,11 +3,12 @@
 // The report page in a real browser:
 //
 //   node report_test.mjs [--report FILE [--run-json FILE]]... [--page FILE] [--playwright DIR]
-//                        [--screenshots DIR] [--opens FILE]
+//                        [--screenshots DIR] [--opens FILE] [--exports DIR]
 //
 // --report: a page as the command writes it, and the run.json it must agree with.
 // --page: the page before data is put into it; it is tested with made-up data of many kinds.
 // --opens: a page of which only that is asked: that it opens without a fault.
+// --exports: where judgements of the first report are saved as truth.csv and not_false.csv.
 // --playwright: the node_modules that holds playwright-core. CHROMIUM names the browser.
 import assert from "node:assert/strict";
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
@@ -25,6 +26,15 @@ import {
 } from "./check_keys.mjs";
 import { checkPaper, checkThemes, checkWidths } from "./check_looks.mjs";
 import { checkNumbers, checkPairs } from "./check_numbers.mjs";
+import {
+  checkEnlarge,
+  checkFigures,
+  checkPlay,
+  checkReview,
+  checkRevisits,
+  checkSearch,
+  checkWeakest,
+} from "./check_review.mjs";
 import { checkCell, checkDrawn, checkViews } from "./check_views.mjs";
 import { pageWith, sampleData } from "./sample.mjs";
 
@@ -61,13 +71,14 @@ function argumentsOf(words) {
     playwright: "node_modules",
     screenshots: null,
     opens: null,
+    exports: null,
   };
   for (let i = 0; i < words.length; i += 2) {
     const [name, value] = [words[i], words[i + 1]];
     assert.ok(value, `${name} needs a value`);
     if (name === "--report") found.reports.push({ file: value, runJson: null });
     else if (name === "--run-json") found.reports.at(-1).runJson = value;
-    else if (["--page", "--playwright", "--screenshots", "--opens"].includes(name))
+    else if (["--page", "--playwright", "--screenshots", "--opens", "--exports"].includes(name))
       found[name.slice(2)] = value;
     else assert.fail(`unknown argument ${name}`);
   }
@@ -102,7 +113,7 @@ async function checkReport(
   browser,
   file,
   name,
-  { runJson = null, screenshots = null, isBrief = false } = {},
+  { runJson = null, screenshots = null, exports = null, isBrief = false } = {},
 ) {
   const failed = [];
   let opened = null;
@@ -130,7 +141,14 @@ async function checkReport(
   await run("clicks, hovering, zoom", checkViews);
   await run("filters and arrow keys", checkFilters);
   await run("true place", checkTruePlace);
+  await run("search", checkSearch);
+  await run("revisits", checkRevisits);
+  await run("weakest first", checkWeakest);
   if (!isBrief) {
+    await run("play", checkPlay);
+    await run("enlarge", checkEnlarge);
+    await run("figures as files", checkFigures);
+    await run("judgements", (page) => checkReview(page, exports));
     // It loads the page again, which the next needs: Tab goes on from where one was last.
     await run("address", checkAddress);
     await run("by Tab alone", async (page) => `${await checkTabs(page)} controls`);
@@ -206,12 +224,14 @@ async function checkOpens(browser, file) {
 }
 
 /** A function for each report, which checks it in a browser. */
-function* checksOfReports({ reports, page, screenshots, opens }, scratch) {
+function* checksOfReports({ reports, page, screenshots, opens, exports }, scratch) {
   if (opens) yield (browser) => checkOpens(browser, opens);
-  for (const { file, runJson } of reports) {
+  for (const [i, { file, runJson }] of reports.entries()) {
     const record = runJson ? JSON.parse(readFileSync(runJson, "utf8")) : null;
     const name = path.basename(path.dirname(path.resolve(file)));
-    yield (browser) => checkReport(browser, file, name, { runJson: record, screenshots });
+    const saved = i === 0 ? exports : null;
+    yield (browser) =>
+      checkReport(browser, file, name, { runJson: record, screenshots, exports: saved });
   }
   if (!page) return;
   const template = readFileSync(page, "utf8");

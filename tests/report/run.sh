@@ -36,4 +36,7 @@ node "$here/report_test.mjs" --playwright "$root/build/page/node_modules" --page
   --report "$scratch/demo/report.html" --run-json "$scratch/demo/run.json" \
   --report "$scratch/second/report.html" --run-json "$scratch/second/run.json" \
   --report "$scratch/mixed/report.html" --run-json "$scratch/mixed/run.json" \
-  --report "$scratch/compared.html" --opens "$scratch/no_frames.html"
+  --exports "$scratch" --report "$scratch/compared.html" --opens "$scratch/no_frames.html"
+
+# What a person judged is truth for the command.
+"$loopbit" eval "$scratch/demo" --truth "$scratch/truth.csv" --not-false "$scratch/not_false.csv"

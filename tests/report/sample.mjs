@@ -128,6 +128,36 @@ function verdictsOf(columns, truth) {
   });
 }
 
+/** Loops whose queries and matches are at most 20 frames from those before. */
+function revisitsOf({ status, match }) {
+  const revisits = [];
+  for (const [frame, one] of status.entries()) {
+    if (one !== statusOf("loop") || match[frame] < 0) continue;
+    const last = revisits.findLast(
+      ({ query, match: to }) => frame - query[1] <= 20 && Math.abs(match[frame] - to[1]) <= 20,
+    );
+    if (last) {
+      last.query[1] = frame;
+      last.match[1] = match[frame];
+      ++last.loops;
+    } else {
+      revisits.push({ query: [frame, frame], match: [match[frame], match[frame]], loops: 1 });
+    }
+  }
+  return revisits;
+}
+
+/** A wrong loop, otherwise the strongest loop of this run, otherwise a missed revisit. */
+function firstFrameOf({ status, match, score }, verdicts) {
+  const wrong = verdicts.indexOf("wrong");
+  if (wrong >= 0) return wrong;
+  const loops = status.flatMap((one, frame) =>
+    one === statusOf("loop") && match[frame] >= 0 ? [frame] : [],
+  );
+  if (loops.length > 0) return loops.reduce((a, b) => (score[b] > score[a] ? b : a));
+  return Math.max(0, verdicts.indexOf("missed"));
+}
+
 function wilson(hits, trials) {
   if (trials === 0) return [0, 1];
   const z = 1.959963984540054;
@@ -360,6 +390,7 @@ function runOf(places, index, options) {
     threshold: isExternal ? null : kThreshold,
     frames,
     frames_known: !isExternal || options.poses || options.runs > 1,
+    names: isExternal ? null : places.map((_, i) => `${String(2 * i).padStart(6, "0")}.png`),
     timestamp_s: isExternal ? null : places.map((_, i) => round(kStart_s + i * 0.1, 6)),
     status_names: isExternal ? ["loop", "no_loop"] : kStatuses,
     status: isExternal ? columns.status.map((status) => (status === 0 ? 0 : 1)) : columns.status,
@@ -375,6 +406,8 @@ function runOf(places, index, options) {
     inliers: isExternal ? null : columns.inliers,
     times_ms,
     verdict,
+    first_frame: firstFrameOf(columns, verdict),
+    revisits: revisitsOf(columns),
     truth,
     evaluation: truth ? evaluationOf(columns, verdict, truth) : null,
     positions: options.poses

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "loopbit/place_index.hpp"
@@ -59,6 +60,7 @@ struct Detection {
   int matches = 0;        ///< one-to-one feature matches between query and match
   int inliers = 0;        ///< matches that fit one epipolar geometry
   StepTimes times = {};
+  std::string name = {};  ///< of the image in its source; run() sets it
 };
 
 /// A candidate place for an image, with the numbers behind it; see LoopDetector::query.

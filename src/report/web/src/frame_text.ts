@@ -13,6 +13,8 @@ export function frameText(model: RunModel, frame: number): string[] {
   const lines = [`frame ${frame}`];
   if (mark) lines[0] += `: ${nameOf(mark)}`;
   else lines[0] += `: ${nameOfStatus(model.status(frame))}`;
+  const name = model.name(frame);
+  if (name !== null) lines.splice(1, 0, name);
   if (model.matchName(frame) !== null) {
     const score = format.score(model.score(frame), model.run.threshold);
     lines.push(`${candidateName(model, frame)}, score ${score}`);

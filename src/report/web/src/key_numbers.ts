@@ -85,16 +85,25 @@ function framesOf(model: RunModel): HTMLElement {
   return number("frames", "frames", format.count(frames), note);
 }
 
+/** Their share of the frames, and in how many revisits they are. */
+function notesOf(model: RunModel): string[] {
+  const share = (100 * model.framesIn("loops").length) / Math.max(1, model.frames);
+  const { revisits, frames_known } = model.run;
+  return [
+    ...(frames_known ? [`${share.toFixed(1)} % of frames`] : []),
+    ...(revisits.length > 0 ? [format.counted(revisits.length, "revisit")] : []),
+  ];
+}
+
 /** The most important numbers. Those that the comparison already shows are left out. */
 export function keyNumbers(model: RunModel, isCompared: boolean): HTMLElement[] {
-  const { evaluation, record, frames_known } = model.run;
+  const { evaluation, record } = model.run;
   const time = model.totalTime();
   const loops = model.framesIn("loops").length;
-  const share = ((100 * loops) / Math.max(1, model.frames)).toFixed(1);
   const found = evaluation && !isCompared ? judged(evaluation) : [];
   const spent = [
     framesOf(model),
-    number("loops", "loops", format.count(loops), frames_known ? `${share} % of frames` : null),
+    number("loops", "loops", format.count(loops), notesOf(model).join(", ")),
   ];
   if (time) {
     spent.push(

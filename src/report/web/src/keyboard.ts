@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: MIT
 
 import { button, html } from "./dom.ts";
+import type { PairBrowser } from "./pair_browser.ts";
 import type { Store } from "./store.ts";
 
 const kKeys: readonly (readonly [string, string])[] = [
   ["← →", "previous and next frame that the filter shows"],
   ["Home End", "first and last of these frames"],
+  ["r w n", "judge the match: right, wrong, not sure; then go on"],
+  ["p", "play along the run, or stop"],
+  ["e", "enlarge the pictures, or not"],
   ["Tab", "next control or plot"],
   [
     "+ − 0",
@@ -41,12 +45,17 @@ function takesKeys(target: EventTarget | null): boolean {
 }
 
 /** Arrow keys walk from anywhere else. */
-export function listenToKeys(store: Store, dialog: HTMLDialogElement): void {
+export function listenToKeys(store: Store, pair: PairBrowser, dialog: HTMLDialogElement): void {
   const acts: Record<string, () => void> = {
     ArrowLeft: () => store.walk(-1),
     ArrowRight: () => store.walk(1),
     Home: () => store.walkToEnd("first"),
     End: () => store.walkToEnd("last"),
+    r: () => pair.review.judge("right"),
+    w: () => pair.review.judge("wrong"),
+    n: () => pair.review.judge("not sure"),
+    p: () => pair.player.toggle(),
+    e: () => pair.enlarge(),
     "?": () => dialog.showModal(),
   };
   addEventListener("keydown", (event) => {

@@ -92,7 +92,7 @@ function start(data: ReportData): void {
   startTheme();
   showRun();
   showSelection();
-  listenToKeys(store, dialog);
+  listenToKeys(store, pair, dialog);
   followPrinting();
   void startPlots().then(() => performance.mark("report-drawn"));
 }

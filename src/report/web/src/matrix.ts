@@ -5,6 +5,7 @@ import { viridis } from "./colour_map.ts";
 import { html, svg } from "./dom.ts";
 import * as format from "./format.ts";
 import { frameText } from "./frame_text.ts";
+import { Path, type Pen } from "./pen.ts";
 import { Plot } from "./plot.ts";
 import type { Hit } from "./plot_spec.ts";
 import { nearest, type Projection } from "./projection.ts";
@@ -122,7 +123,7 @@ export class Matrix implements View {
     this.key.replaceChildren(bar, ends);
   }
 
-  private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private draw(ctx: Pen, to: Projection, theme: Theme): void {
     const { image, truth } = this;
     if (image) {
       const size = image.side * image.framesPerCell;
@@ -144,14 +145,14 @@ export class Matrix implements View {
     }
   }
 
-  private drawDiagonal(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private drawDiagonal(ctx: Pen, to: Projection, theme: Theme): void {
     const { frames } = this.store.model;
     ctx.strokeStyle = theme.faint;
     ctx.lineWidth = to.ratio;
-    ctx.beginPath();
-    ctx.moveTo(to.x(0), to.y(0));
-    ctx.lineTo(to.x(frames), to.y(frames));
-    ctx.stroke();
+    const line = new Path();
+    line.moveTo(to.x(0), to.y(0));
+    line.lineTo(to.x(frames), to.y(frames));
+    ctx.stroke(line);
   }
 
   /** The nearest loop mark, otherwise the pair under the pointer. */

@@ -8,7 +8,10 @@ import { PairContents } from "./pair_contents.ts";
 import { pairFacts } from "./pair_facts.ts";
 import { PairPictures } from "./pair_pictures.ts";
 import { candidateName } from "./partner.ts";
+import { Player } from "./player.ts";
+import { Review } from "./review.ts";
 import type { RunModel } from "./run_model.ts";
+import { saveButtons } from "./save.ts";
 import type { Selection, Store } from "./store.ts";
 import type { View } from "./view.ts";
 
@@ -19,10 +22,9 @@ export class PairBrowser implements View {
   private readonly number = html("input", {
     id: "frame-number",
     type: "text",
-    inputmode: "numeric",
     autocomplete: "off",
-    "aria-label": "Frame number",
-    maxlength: 9,
+    "aria-label": "Frame number, name of an image, or time",
+    title: "A frame number, a name or part of one, or seconds: 12.5 s",
   });
   private readonly position = html("span", { class: "position", "aria-live": "polite" });
   private readonly partners = html("div", { class: "partners", role: "group" });
@@ -30,11 +32,24 @@ export class PairBrowser implements View {
   private readonly contents = new PairContents();
   private readonly facts = html("div", { class: "pair-facts" });
   private readonly lines: HTMLButtonElement;
+  private readonly order: HTMLButtonElement;
+  private readonly enlarged: HTMLDialogElement;
+  readonly player: Player;
+  readonly review: Review;
   private withLines = true;
 
   constructor(private readonly store: Store) {
     this.filters = new Filters(store);
+    this.player = new Player(store);
+    this.review = new Review(store);
     this.lines = button({ class: "quiet" }, () => this.toggleLines(), "inlier lines");
+    const weakest = "Visit loops by rising score, the weakest first";
+    this.order = button(
+      { class: "quiet", title: weakest },
+      () => store.toggleOrder(),
+      "weakest first",
+    );
+    this.enlarged = this.dialog();
     this.partners.setAttribute("aria-label", "Shown beside the query");
     this.number.addEventListener("change", () => this.goToNumber());
     this.element = html(
@@ -54,12 +69,22 @@ export class PairBrowser implements View {
         this.number,
         button({ "aria-label": "Next frame", title: "Next (→)" }, () => store.walk(1), "→"),
         this.position,
-        this.lines,
+        this.order,
+        this.player.button,
       ),
       this.partners,
       this.pictures.element,
+      html(
+        "div",
+        { class: "pair-tools" },
+        this.lines,
+        button({ class: "quiet", title: "Enlarge (e)" }, () => this.enlarge(), "enlarge"),
+        saveButtons("Query and match", () => this.pictures.figure()),
+      ),
       this.facts,
+      this.review.element,
       this.contents.element,
+      this.enlarged,
     );
   }
 
@@ -71,16 +96,39 @@ export class PairBrowser implements View {
     const model = this.store.model;
     this.filters.showSelection(selection);
     this.number.value = String(selection.frame);
-    this.showPosition(model, selection);
+    this.showPosition(selection);
     this.showPartners(model, selection);
     setPressed(this.lines, this.withLines);
+    setPressed(this.order, selection.order === "weakest");
+    this.review.show();
     this.facts.replaceChildren(...pairFacts(model, selection));
     this.contents.show(model, selection);
     void this.pictures.show(model, selection, this.withLines);
   }
 
-  private showPosition(model: RunModel, { frame, filter }: Selection): void {
-    const frames = model.framesIn(filter);
+  /** Shows the pictures as large as the window, or back in their place. */
+  enlarge(): void {
+    if (this.enlarged.open) {
+      this.enlarged.close();
+      return;
+    }
+    this.enlarged.prepend(this.pictures.element);
+    this.enlarged.showModal();
+  }
+
+  private dialog(): HTMLDialogElement {
+    const made = html(
+      "dialog",
+      { id: "enlarged", "aria-label": "Query and match, enlarged" },
+      button({}, () => made.close(), "Close"),
+    );
+    made.addEventListener("close", () => this.partners.after(this.pictures.element));
+    this.pictures.element.addEventListener("click", () => this.enlarge());
+    return made;
+  }
+
+  private showPosition({ frame, filter }: Selection): void {
+    const frames = this.store.frames();
     const at = frames.indexOf(frame);
     const all = format.count(frames.length);
     this.position.textContent = at < 0 ? `${all} ${filter}` : `${format.count(at + 1)} of ${all}`;
@@ -113,7 +161,9 @@ export class PairBrowser implements View {
 
   private goToNumber(): void {
     const text = this.number.value.trim();
-    if (/^\d+$/.test(text)) this.store.select(Number(text));
+    const frame = text === "" ? null : this.store.model.find(text, this.store.now.frame);
+    if (frame !== null) this.store.select(frame);
+    else if (text !== "") this.position.textContent = `no frame '${text}'`;
     this.number.value = String(this.store.now.frame);
   }
 }

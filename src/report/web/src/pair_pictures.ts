@@ -5,6 +5,7 @@ import { bytesOf } from "./content.ts";
 import { html, svg } from "./dom.ts";
 import { absenceOf, partnerAbsence, partnerName } from "./partner.ts";
 import type { RunModel } from "./run_model.ts";
+import { type Figure, figureOf } from "./save.ts";
 import type { Selection } from "./store.ts";
 
 /** Gap between the two pictures, as a share of the width of one. */
@@ -15,11 +16,16 @@ const kManyLines = 40;
 const kCrowd = 120;
 /** Radius of an inlier, as a share of the width of a picture. */
 const kDot = 0.009;
+const kWidth_px = 640;
 
 /** Query and partner side by side, and the inlier matches as lines from one to the other. */
 export class PairPictures {
   readonly element = html("div", { class: "pictures", role: "img" });
   private shown = 0;
+
+  figure(): Figure | null {
+    return drawingOf(this.element);
+  }
 
   async show(model: RunModel, selection: Selection, withLines: boolean) {
     const turn = ++this.shown;
@@ -40,15 +46,47 @@ export class PairPictures {
       "aria-label",
       `Query ${frame} and ${name}, ${inliers.length / 4} inlier matches drawn.`,
     );
+    const beside = model.partner(selection);
     this.element.replaceChildren(
-      framed(query, aspect, `query ${frame}`, absenceOf(model, frame)),
-      framed(partner, partnerAspect, name, partnerAbsence(model, selection)),
+      framed(query, aspect, `query ${frame}`, model.name(frame), absenceOf(model, frame)),
+      framed(
+        partner,
+        partnerAspect,
+        name,
+        beside === null ? null : model.name(beside),
+        partnerAbsence(model, selection),
+      ),
     );
     if (inliers.length > 0) {
       const mark = model.mark(frame) ?? "none";
       this.element.append(linesOf(inliers, aspect, partnerAspect, isStacked, mark));
     }
   }
+}
+
+/** What is shown, as a drawing of which each picture is `kWidth_px` wide; null without a picture. */
+function drawingOf(element: HTMLElement): Figure | null {
+  const whole = element.getBoundingClientRect();
+  const images = [...element.querySelectorAll("img")];
+  if (images.length === 0) return null;
+  const scale = kWidth_px / (images[0]?.getBoundingClientRect().width ?? 1);
+  const content = images.map((image) => {
+    const box = image.getBoundingClientRect();
+    const [x, y] = [scale * (box.left - whole.left), scale * (box.top - whole.top)];
+    const size = `width="${scale * box.width}" height="${scale * box.height}"`;
+    return `<image x="${x}" y="${y}" ${size} href="${image.src}"></image>`;
+  });
+  const [width, height] = [Math.round(scale * whole.width), Math.round(scale * whole.height)];
+  const lines = element.querySelector("svg.inliers");
+  if (lines) {
+    const colour = getComputedStyle(lines).getPropertyValue("--line").trim();
+    const view = `viewBox="${lines.getAttribute("viewBox")}" preserveAspectRatio="none"`;
+    const style = `fill="${colour}" stroke="${colour}" stroke-width="0.002"`;
+    content.push(
+      `<svg ${view} width="${width}" height="${height}" ${style}>${lines.innerHTML}</svg>`,
+    );
+  }
+  return figureOf(width, height, content.join("\n"), "sans-serif");
 }
 
 async function load(model: RunModel, frame: number | null): Promise<HTMLImageElement | null> {
@@ -82,12 +120,14 @@ function framed(
   image: HTMLImageElement | null,
   aspect: number,
   tag: string,
+  name: string | null,
   absence: string,
 ): HTMLElement {
   const box = html("div", { class: "picture" });
   box.style.aspectRatio = `${1 / aspect}`;
   box.append(image ?? html("p", { class: "absent" }, absence));
   box.append(html("span", { class: "tag" }, tag));
+  if (name !== null) box.append(html("span", { class: "tag name", title: name }, name));
   return box;
 }
 

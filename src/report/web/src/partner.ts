@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
+import * as format from "./format.ts";
 import type { RunModel } from "./run_model.ts";
 import type { Selection } from "./store.ts";
 
@@ -22,12 +23,14 @@ export function partnerName(model: RunModel, selection: Selection): string {
 /** Why a frame of this run has no picture, and how to get one. */
 export function absenceOf(model: RunModel, frame: number): string {
   if (!model.isReadable(frame)) return "This image could not be read.";
-  if (Object.keys(model.run.pictures).length === 0) {
+  const pictures = Object.keys(model.run.pictures).length;
+  if (pictures === 0) {
     return model.run.record
       ? "This run has no pictures, or --pictures-mb left no space for them."
       : "Only runs of loopbit have pictures.";
   }
-  return "Left out to keep the page small. --pictures-mb N allows more.";
+  const some = `${format.count(pictures)} of ${format.counted(model.frames, "frame")}`;
+  return `Left out to keep the page small: it has pictures of ${some}. 'loopbit report RUN --pictures-mb N' writes a page with more.`;
 }
 
 function noCandidate(model: RunModel, frame: number): string {

@@ -5,10 +5,12 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import { type Bounds, middle, panned, shows, withEqualAxes, zoomed } from "./bounds.ts";
 import { button, html, svg } from "./dom.ts";
-import { axesOf } from "./plot_axes.ts";
+import { SvgPen } from "./pen.ts";
+import { axesOf, drawAxes, type Ticks } from "./plot_axes.ts";
 import { kZoomStep, listenToPlot, type PlotInput } from "./plot_input.ts";
 import type { Hit, PlotSpec } from "./plot_spec.ts";
 import { Projection } from "./projection.ts";
+import { type Figure, figureOf, saveButtons } from "./save.ts";
 import { onThemeChange, theme } from "./theme.ts";
 
 const plots: Plot[] = [];
@@ -34,6 +36,7 @@ export class Plot implements PlotInput {
   private home: Bounds = { x: [0, 1], y: [0, 1] };
   private view: Bounds = this.home;
   private hovered: Hit | null = null;
+  private ticks: Record<"x" | "y", Ticks> = { x: [], y: [] };
 
   constructor(private readonly spec: PlotSpec) {
     const keys = spec.zoom === "none" ? "" : " Keys + and - zoom about the frame, 0 shows all.";
@@ -53,10 +56,18 @@ export class Plot implements PlotInput {
     new ResizeObserver(() => this.resize()).observe(this.element);
   }
 
-  /** Zoom buttons, for users without wheel or drag. */
+  private get name(): string {
+    return this.spec.label.split(".")[0] ?? "";
+  }
+
+  saveButtons(): HTMLElement {
+    return saveButtons(this.name, () => this.figure());
+  }
+
+  /** Buttons to save the figure and to zoom, for users without wheel or drag. */
   controls(): HTMLElement {
-    const name = this.spec.label.split(".")[0] ?? "";
-    return html(
+    const { name } = this;
+    const zoom = html(
       "span",
       { class: "zoom" },
       button(
@@ -71,6 +82,25 @@ export class Plot implements PlotInput {
       ),
       button({ "aria-label": `Show all: ${name}`, title: "Show all" }, () => this.reset(), "reset"),
     );
+    return html("span", { class: "plot-tools" }, this.saveButtons(), zoom);
+  }
+
+  /** What is in view, without the selection. */
+  private figure(): Figure | null {
+    const { plot } = this;
+    if (!plot) return null;
+    const { width, height } = this.area(plot);
+    const [left, top] = [plot.bbox.left / uPlot.pxRatio, plot.bbox.top / uPlot.pxRatio];
+    const yDown = this.spec.yDown === true;
+    const to = new Projection(this.view, left, top, width, height, yDown, 1);
+    const [frame, content] = [new SvgPen(), new SvgPen()];
+    frame.fillStyle = theme().paper;
+    frame.fillRect(0, 0, plot.width, plot.height);
+    if (!this.spec.hideAxes?.()) drawAxes(frame, to, this.ticks, this.spec, theme());
+    this.spec.draw(content, to, theme());
+    const box = `x="${left}" y="${top}" width="${width}" height="${height}"`;
+    const clipped = `<svg ${box} viewBox="${left} ${top} ${width} ${height}">\n${content.content}\n</svg>`;
+    return figureOf(plot.width, plot.height, `${frame.content}\n${clipped}`, theme().font);
   }
 
   /** Shows everything again, after the data changed. */
@@ -139,7 +169,8 @@ export class Plot implements PlotInput {
 
   private make(size: { width: number; height: number }): uPlot {
     const range = (axis: "x" | "y") => (): uPlot.Range.MinMax => [...this.view[axis]];
-    const { axes, overhang } = axesOf(this.spec);
+    const { axes, overhang, ticks } = axesOf(this.spec);
+    this.ticks = ticks;
     const plot = new uPlot(
       {
         ...size,

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 
 import type { Bounds, ZoomAxes } from "./bounds.ts";
+import type { Pen } from "./pen.ts";
 import type { Projection } from "./projection.ts";
 import type { Against } from "./store.ts";
 import type { Theme } from "./theme.ts";
@@ -30,7 +31,7 @@ export interface PlotSpec {
   hideAxes?: () => boolean;
   /** The bounds of the whole content. */
   bounds(): Bounds;
-  draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void;
+  draw(ctx: Pen, to: Projection, theme: Theme): void;
   /** `pixel` and `to` in CSS pixels of the plotting area. */
   hit(pixel: { x: number; y: number }, to: Projection): Hit | null;
   /** The marks of the selection, in CSS pixels of the plotting area. */

@@ -4,6 +4,7 @@
 import { html, svg } from "./dom.ts";
 import { curveOf, figuresOf } from "./figures.ts";
 import * as format from "./format.ts";
+import { Path, type Pen } from "./pen.ts";
 import { Plot } from "./plot.ts";
 import type { Hit } from "./plot_spec.ts";
 import { nearest, type Projection } from "./projection.ts";
@@ -89,7 +90,7 @@ export class PrecisionRecall implements View {
     this.plot.follow();
   }
 
-  private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private draw(ctx: Pen, to: Projection, theme: Theme): void {
     this.models.forEach((model, i) => {
       if (model !== this.store.model) this.drawCurve(ctx, to, theme, model, i, false);
     });
@@ -98,7 +99,7 @@ export class PrecisionRecall implements View {
   }
 
   private drawCurve(
-    ctx: CanvasRenderingContext2D,
+    ctx: Pen,
     to: Projection,
     theme: Theme,
     model: RunModel,
@@ -107,7 +108,7 @@ export class PrecisionRecall implements View {
   ): void {
     const { evaluation } = model.run;
     if (!evaluation) return;
-    const path = new Path2D();
+    const path = new Path();
     curveOf(evaluation).forEach((point, i) => {
       if (i === 0) path.moveTo(to.x(0), to.y(point.precision));
       path.lineTo(to.x(point.recall), to.y(point.precision));
@@ -121,16 +122,19 @@ export class PrecisionRecall implements View {
     const { recall, precision, recallAtFullPrecision: full } = figuresOf(evaluation);
     if (full !== null) {
       const bar = 7 * to.ratio;
-      ctx.strokeRect(to.x(full), to.y(1) - bar, 0, 2 * bar);
+      const limit = new Path();
+      limit.moveTo(to.x(full), to.y(1) - bar);
+      limit.lineTo(to.x(full), to.y(1) + bar);
+      ctx.stroke(limit);
     }
     if (recall === null || precision === null) return;
-    ctx.beginPath();
-    ctx.arc(to.x(recall), to.y(precision), (isSelected ? 5.5 : 4) * to.ratio, 0, 7);
+    const dot = new Path();
+    dot.circle(to.x(recall), to.y(precision), (isSelected ? 5.5 : 4) * to.ratio);
     ctx.fillStyle = isSelected ? theme.right : theme.muted;
-    ctx.fill();
+    ctx.fill(dot);
     ctx.lineWidth = 1.5 * to.ratio;
     ctx.strokeStyle = theme.paper;
-    ctx.stroke();
+    ctx.stroke(dot);
   }
 
   /** The frame whose score makes the point of the curve. */

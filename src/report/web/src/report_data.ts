@@ -22,6 +22,15 @@ export type Verdict =
   | "elsewhere" // a loop into an earlier session of the map, which truth does not cover
   | "ignored"; // not scored
 
+/** Loops in a row: the camera passes places in the order of an earlier pass, or in reverse. */
+export interface Revisit {
+  /** First and last frame. */
+  query: [number, number];
+  /** Their matches. */
+  match: [number, number];
+  loops: number;
+}
+
 /** Columns have one entry per frame. */
 export interface Run {
   name: string;
@@ -32,6 +41,8 @@ export interface Run {
   frames: number;
   /** False if `frames` is a lower bound: other detectors may list only frames with a match. */
   frames_known: boolean;
+  /** Names of the images; null if unknown. */
+  names: string[] | null;
   timestamp_s: (number | null)[] | null;
   /** Names of statuses ("loop", "no_earlier_place", ...), and an index into them for each frame. */
   status_names: string[];
@@ -48,6 +59,10 @@ export interface Run {
   inliers: number[] | null;
   times_ms: StepTimes | null;
   verdict: Verdict[];
+  /** The frame that the page opens on. */
+  first_frame: number;
+  /** The accepted matches, grouped, in the order of their first queries. */
+  revisits: Revisit[];
   /** Flat triples query, first, last; and a description of the source, if known. */
   truth: { same_place: number[]; near_place: number[]; source: string | null } | null;
   evaluation: Evaluation | null;
@@ -58,7 +73,8 @@ export interface Run {
     axes: [x: string, y: string];
   } | null;
   similarity_matrix: SimilarityMatrix | null;
-  /** By frame number. Not every frame has one: the report has a size budget. */
+  /** By frame number. Not every frame has one: the report has a size budget, which the first
+   * frame, wrong loops and the weakest loops use before others. */
   pictures: Record<string, Picture>;
 }
 

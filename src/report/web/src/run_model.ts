@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
-import type { Run, TimeSummary, Verdict } from "./report_data.ts";
+import type { Revisit, Run, TimeSummary, Verdict } from "./report_data.ts";
 import type { Against } from "./store.ts";
 import { isMarked, type Marked } from "./verdicts.ts";
 
@@ -15,12 +15,19 @@ export const kFilters = [
   "elsewhere",
 ] as const;
 export type Filter = (typeof kFilters)[number];
+/** In which order the arrow keys visit frames; the weakest have the lowest scores. */
+export type Order = "frame" | "weakest";
 
 export type Step = "content" | "retrieval" | "features" | "verification";
 export const kSteps: readonly Step[] = ["content", "retrieval", "features", "verification"];
 
 /** The detector's default, for runs without a record. */
 const kDefaultShiftTolerance = 4;
+
+/** Fewer loops than that are drawn one by one. */
+const kLongRevisit = 3;
+/** How far a loop of a revisit may lie from its ends, in frames; see revisits.hpp. */
+const kReach = 20;
 
 type Span = readonly [first: number, last: number];
 
@@ -34,12 +41,15 @@ export interface EarlierFrame {
 export class RunModel {
   /** Total milliseconds per frame; null if the detector does not report them. */
   readonly totals_ms: readonly number[] | null;
+  /** The revisits that are drawn as one: those of several loops. */
+  readonly longRevisits: readonly Revisit[];
   private readonly truth = new Map<number, Span[]>();
   private readonly members = new Map<Filter, readonly number[]>();
   private readonly marked = new Map<Marked, readonly number[]>();
 
   constructor(readonly run: Run) {
     this.totals_ms = totals(run);
+    this.longRevisits = run.revisits.filter(({ loops }) => loops >= kLongRevisit);
     const triples = run.truth?.same_place ?? [];
     for (let i = 0; i + 2 < triples.length; i += 3) {
       const [query, first, last] = triples.slice(i, i + 3) as [number, number, number];
@@ -77,6 +87,42 @@ export class RunModel {
   /** Null if the detector reports nothing for the frame. */
   score(frame: number): number | null {
     return this.run.score[frame] ?? null;
+  }
+
+  /** The name of its image, unless that is only its number. */
+  name(frame: number): string | null {
+    const name = this.run.names?.[frame] ?? "";
+    return name === "" || name === String(frame) ? null : name;
+  }
+
+  /**
+   * The frame that a text means: a number; a name or a part of one, the next from `frame` on; or
+   * seconds since the first frame, as "12.5 s". Null if there is none.
+   */
+  find(text: string, frame: number): number | null {
+    const number = Number(text);
+    if (String(number) === text && Number.isInteger(number))
+      return Math.min(number, this.frames - 1);
+    const named = this.run.names?.indexOf(text) ?? -1;
+    if (named >= 0) return named;
+    const seconds = text.match(/^(\d+(?:\.\d*)?) ?s$/);
+    if (seconds) return this.frameAt(Number(seconds[1]));
+    const names = this.run.names ?? [];
+    const isHit = (name: string) => name.includes(text);
+    const next = names.findIndex((name, i) => i > frame && isHit(name));
+    const any = next < 0 ? names.findIndex(isHit) : next;
+    return any < 0 ? null : any;
+  }
+
+  /** The frame whose time is nearest, in seconds since the first; null without times. */
+  private frameAt(time_s: number): number | null {
+    const apart = (frame: number) =>
+      Math.abs((this.run.timestamp_s?.[frame] ?? Number.NaN) - this.firstTime() - time_s);
+    const timed = this.where((frame) => !Number.isNaN(apart(frame)));
+    return timed.reduce<number | null>(
+      (best, frame) => (best === null || apart(frame) < apart(best) ? frame : best),
+      null,
+    );
   }
 
   /** Whether the detector reports unreadable frames. */
@@ -167,6 +213,23 @@ export class RunModel {
     return frames;
   }
 
+  /** The frames that pass a filter, as the arrow keys visit them. */
+  walk(filter: Filter, order: Order): readonly number[] {
+    const frames = this.framesIn(filter);
+    if (order === "frame") return frames;
+    const score = (frame: number) => this.score(frame) ?? Number.POSITIVE_INFINITY;
+    return [...frames].sort((a, b) => score(a) - score(b) || a - b);
+  }
+
+  /** Whether a loop is one of a long revisit's. */
+  isInLongRevisit(frame: number): boolean {
+    const match = this.match(frame) ?? -1;
+    return this.longRevisits.some(({ query, match: [a, b] }) => {
+      const isAmong = frame >= query[0] && frame <= query[1];
+      return isAmong && match >= Math.min(a, b) - kReach && match <= Math.max(a, b) + kReach;
+    });
+  }
+
   /** The loops with a frame of another session. */
   loopsElsewhere(): readonly number[] {
     return this.framesIn("loops").filter((frame) => !this.isLoopHere(frame));
@@ -190,16 +253,6 @@ export class RunModel {
   stepTime(step: Step): TimeSummary | null {
     const times = this.run.times_ms?.[step];
     return this.run.record?.times_ms?.[step] ?? (times ? this.summary(times) : null);
-  }
-
-  /** The frame shown first: a failure, otherwise the loop with the highest score. */
-  firstFrame(): number {
-    const wrong = this.framesIn("wrong")[0];
-    if (wrong !== undefined) return wrong;
-    const score = (frame: number) => this.score(frame) ?? Number.NEGATIVE_INFINITY;
-    const loops = this.framesIn("loops");
-    const first = loops[0] ?? this.framesIn("missed")[0] ?? 0;
-    return loops.reduce((best, frame) => (score(frame) > score(best) ? frame : best), first);
   }
 
   /** The mark of a frame. An ignored frame has one only if it is a loop. */

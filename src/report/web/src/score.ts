@@ -5,6 +5,7 @@ import type { Bounds } from "./bounds.ts";
 import { svg } from "./dom.ts";
 import * as format from "./format.ts";
 import { frameText } from "./frame_text.ts";
+import { Path, type Pen } from "./pen.ts";
 import { Plot } from "./plot.ts";
 import { nearest, type Projection } from "./projection.ts";
 import type { RunModel } from "./run_model.ts";
@@ -85,7 +86,7 @@ export class Score implements View {
     };
   }
 
-  private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private draw(ctx: Pen, to: Projection, theme: Theme): void {
     const model = this.store.model;
     this.drawUnmarked(ctx, to, theme);
     const count = model.framesIn("loops").length + model.framesIn("missed").length;
@@ -96,7 +97,7 @@ export class Score implements View {
     if (model.run.threshold !== null) this.drawThreshold(ctx, to, theme, model.run.threshold);
   }
 
-  private drawUnmarked(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private drawUnmarked(ctx: Pen, to: Projection, theme: Theme): void {
     const model = this.store.model;
     const size = (model.frames > 2000 ? 2 : 3) * to.ratio;
     ctx.fillStyle = theme.faint;
@@ -106,20 +107,15 @@ export class Score implements View {
     }
   }
 
-  private drawThreshold(
-    ctx: CanvasRenderingContext2D,
-    to: Projection,
-    theme: Theme,
-    threshold: number,
-  ): void {
+  private drawThreshold(ctx: Pen, to: Projection, theme: Theme, threshold: number): void {
     const y = to.y(threshold);
     ctx.strokeStyle = theme.ink;
     ctx.lineWidth = 1.2 * to.ratio;
     ctx.setLineDash([5 * to.ratio, 4 * to.ratio]);
-    ctx.beginPath();
-    ctx.moveTo(to.left, y);
-    ctx.lineTo(to.left + to.width, y);
-    ctx.stroke();
+    const line = new Path();
+    line.moveTo(to.left, y);
+    line.lineTo(to.left + to.width, y);
+    ctx.stroke(line);
     ctx.setLineDash([]);
     ctx.font = `${12 * to.ratio}px ${theme.font}`;
     ctx.textAlign = "left";

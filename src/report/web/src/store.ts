@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
-import { type Filter, kFilters, type RunModel } from "./run_model.ts";
+import { type Filter, kFilters, type Order, type RunModel } from "./run_model.ts";
 
 /** The frame beside the selected one: its best candidate, its true place, or any frame. */
 export type Against = "match" | "truth" | number;
@@ -11,6 +11,7 @@ export interface Selection {
   frame: number;
   against: Against;
   filter: Filter;
+  order: Order;
 }
 
 type Listener = (now: Selection, before: Selection) => void;
@@ -22,7 +23,13 @@ export class Store {
 
   constructor(private readonly models: readonly RunModel[]) {
     const first = models[0];
-    this.selection = { run: 0, frame: first?.firstFrame() ?? 0, against: "match", filter: "all" };
+    this.selection = {
+      run: 0,
+      frame: first?.run.first_frame ?? 0,
+      against: "match",
+      filter: "all",
+      order: "frame",
+    };
     this.selection = this.valid(this.fromAddress());
     addEventListener("hashchange", () => this.change(this.fromAddress()));
   }
@@ -60,22 +67,41 @@ export class Store {
   change(to: Partial<Selection>): void {
     const before = this.selection;
     this.selection = this.valid({ ...before, ...to });
-    const { run, frame, against, filter } = this.selection;
+    const { run, frame, against, filter, order } = this.selection;
     const same =
       run === before.run &&
       frame === before.frame &&
       against === before.against &&
-      filter === before.filter;
+      filter === before.filter &&
+      order === before.order;
     if (same) return;
     this.toAddress();
     for (const listener of this.listeners) listener(this.selection, before);
   }
 
+  /** The frames that the arrow keys visit. */
+  frames(): readonly number[] {
+    return this.model.walk(this.selection.filter, this.selection.order);
+  }
+
+  /** Visits loops by rising score, beginning with the weakest, or frames in order again. */
+  toggleOrder(): void {
+    const { filter, order } = this.selection;
+    if (order === "weakest") {
+      this.change({ order: "frame" });
+      return;
+    }
+    this.change({ order: "weakest", filter: filter === "all" ? "loops" : filter });
+    this.walkToEnd("first");
+  }
+
   /** Moves by `step` frames among those that the filter shows. */
   walk(step: number): void {
-    const frames = this.model.framesIn(this.selection.filter);
-    const { frame } = this.selection;
-    const after = frames.findIndex((candidate) => candidate >= frame);
+    const frames = this.frames();
+    const { frame, order } = this.selection;
+    const isNext = (candidate: number) =>
+      order === "frame" ? candidate >= frame : candidate === frame;
+    const after = frames.findIndex(isNext);
     const at = after < 0 ? frames.length : after;
     const isMember = frames[at] === frame;
     const to = step > 0 && !isMember ? at + step - 1 : at + step;
@@ -84,7 +110,7 @@ export class Store {
   }
 
   walkToEnd(end: "first" | "last"): void {
-    const frames = this.model.framesIn(this.selection.filter);
+    const frames = this.frames();
     const frame = end === "first" ? frames[0] : frames.at(-1);
     if (frame !== undefined) this.select(frame);
   }
@@ -111,15 +137,17 @@ export class Store {
       frame: number("frame") ?? this.selection.frame,
       against,
       filter: filter ?? "all",
+      order: fields.get("order") === "weakest" ? "weakest" : "frame",
     };
   }
 
   private toAddress(): void {
-    const { run, frame, against, filter } = this.selection;
+    const { run, frame, against, filter, order } = this.selection;
     const fields = [`frame=${frame}`];
     if (run > 0) fields.unshift(`run=${run}`);
     if (against !== "match") fields.push(`with=${against}`);
     if (filter !== "all") fields.push(`show=${filter}`);
+    if (order !== "frame") fields.push(`order=${order}`);
     history.replaceState(null, "", `#${fields.join("&")}`);
   }
 }

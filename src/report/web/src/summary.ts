@@ -49,6 +49,26 @@ function toleratedOf(model: RunModel, tolerated: number): string {
   return `${format.count(tolerated)} tolerated${at}`;
 }
 
+/** "3" if all are the same, otherwise "1 to 3". */
+function range(values: readonly number[]): string {
+  const [low, high] = [Math.min(...values), Math.max(...values)];
+  return low === high ? format.count(low) : `${format.count(low)} to ${format.count(high)}`;
+}
+
+/** The results of all runs in one sentence. */
+export function sentenceOfAll(models: readonly RunModel[]): string {
+  const judged = models.flatMap((model) => model.run.evaluation ?? []);
+  if (judged.length < models.length) {
+    return `${capital(range(models.map((model) => model.framesIn("loops").length)))} loops found.`;
+  }
+  const most = Math.max(...judged.map(({ positives }) => positives));
+  const found =
+    most === 0
+      ? "no revisit is scored"
+      : `${range(judged.map(({ right }) => right))} of ${format.counted(most, "revisit")} found`;
+  return `${capital(found)}, ${range(judged.map(({ wrong }) => wrong))} wrong loops.`;
+}
+
 const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** Name, sentence and numbers; with several runs also a table. */
@@ -57,6 +77,7 @@ export class Summary implements View {
   private readonly title = html("h1");
   private readonly input = html("p", { class: "input" });
   private readonly sentence = html("p", { class: "lead", "data-key": "sentence" });
+  private readonly shown = html("p", { class: "shown", "data-key": "shown" });
   private readonly notice = html("p", { class: "notice", role: "note" });
   private readonly numbers = html("div", { class: "key-numbers" });
   private readonly origin = html("p", { class: "origin" });
@@ -75,6 +96,7 @@ export class Summary implements View {
       this.sentence,
       this.notice,
       this.table?.element ?? null,
+      this.shown,
       this.numbers,
       this.origin,
     );
@@ -82,11 +104,15 @@ export class Summary implements View {
 
   showRun(model: RunModel): void {
     const { run } = model;
-    this.title.textContent = run.name;
-    document.title = `${run.name} - loopbit report`;
+    const names = this.models.map((other) => other.run.name);
+    this.title.textContent =
+      names.length > 1 ? `${names.length} runs: ${names.join(", ")}` : run.name;
+    document.title = `${names.length > 1 ? `${names.length} runs` : run.name} - loopbit report`;
     const { path, description } = run.record?.input ?? { path: "", description: "" };
     this.input.textContent = path && `${path} (${description})`;
-    this.sentence.textContent = sentenceOf(model);
+    this.sentence.textContent = names.length > 1 ? sentenceOfAll(this.models) : sentenceOf(model);
+    this.shown.hidden = names.length < 2;
+    this.shown.textContent = `Shown below: ${run.name}. ${sentenceOf(model)}`;
     const notice = noticeOf(run);
     this.notice.textContent = notice;
     this.notice.hidden = notice === "";

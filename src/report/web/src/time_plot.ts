@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: MIT
 
 import type { Bounds } from "./bounds.ts";
-import { svg } from "./dom.ts";
+import { html, svg } from "./dom.ts";
 import * as format from "./format.ts";
+import { Path, type Pen } from "./pen.ts";
 import { Plot } from "./plot.ts";
 import type { Hit } from "./plot_spec.ts";
 import type { Projection } from "./projection.ts";
@@ -43,7 +44,7 @@ export class TimePlot {
       selected: (to) => this.selected(to),
       select: (hit) => this.store.select(hit.frame),
     });
-    this.element = this.plot.element;
+    this.element = html("div", {}, this.plot.element, this.plot.saveButtons());
   }
 
   refresh(): void {
@@ -77,7 +78,7 @@ export class TimePlot {
     };
   }
 
-  private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private draw(ctx: Pen, to: Projection, theme: Theme): void {
     for (const bin of this.bins) {
       const left = to.x(bin.from);
       const gap = to.x(bin.to) - left > 4 * to.ratio ? to.ratio : 0;
@@ -93,7 +94,7 @@ export class TimePlot {
     if (this.isDistribution) this.drawFigures(ctx, to, theme);
   }
 
-  private drawFigures(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private drawFigures(ctx: Pen, to: Projection, theme: Theme): void {
     const summary = this.store.model.totalTime();
     if (!summary) return;
     ctx.font = `${12 * to.ratio}px ${theme.font}`;
@@ -102,10 +103,10 @@ export class TimePlot {
       ctx.setLineDash([4 * to.ratio, 3 * to.ratio]);
       ctx.strokeStyle = theme.ink;
       ctx.lineWidth = 1.2 * to.ratio;
-      ctx.beginPath();
-      ctx.moveTo(x, to.top);
-      ctx.lineTo(x, to.top + to.height);
-      ctx.stroke();
+      const line = new Path();
+      line.moveTo(x, to.top);
+      line.lineTo(x, to.top + to.height);
+      ctx.stroke(line);
       ctx.setLineDash([]);
       const isRight = x > to.left + 0.6 * to.width;
       ctx.textAlign = isRight ? "right" : "left";

@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: MIT
 
 import { type Bounds, padded } from "./bounds.ts";
-import { svg } from "./dom.ts";
+import { button, html, svg } from "./dom.ts";
+import * as format from "./format.ts";
 import { ringOf } from "./frame_ring.ts";
 import { frameText } from "./frame_text.ts";
 import { legend } from "./legend.ts";
+import { Path, type Pen } from "./pen.ts";
 import { Plot } from "./plot.ts";
 import { nearest, type Projection } from "./projection.ts";
+import type { Revisit } from "./report_data.ts";
 import type { RunModel } from "./run_model.ts";
 import type { Selection, Store } from "./store.ts";
 import type { Theme } from "./theme.ts";
@@ -19,18 +22,24 @@ const kMarkedFirst_px = -6;
 const kCurveSteps = 10;
 const kManyLoops = 1500;
 
+const kListed = 8;
+
+const spanText = ([a, b]: readonly [number, number]) => (a === b ? `${a}` : `${a}–${b}`);
+
 /** The trajectory with its loops; without positions the frames on a ring. */
 export class Trajectory implements View {
   readonly element: HTMLElement;
   private readonly caption = caption();
+  private readonly title = html("span");
   private readonly legend = legend();
+  private readonly revisits = html("ul", { class: "revisits", "aria-label": "Revisits" });
   private readonly plot: Plot;
   private isRing = false;
   private places: (Point | null)[] = [];
 
   constructor(private readonly store: Store) {
     this.plot = new Plot({
-      label: "Trajectory. Frames with their loops.",
+      label: "Loops. Frames with their loops, on the trajectory or on a ring.",
       xLabel: "m",
       yLabel: "m",
       height: (width) => Math.max(280, Math.min(width * 0.62, 560)),
@@ -52,11 +61,12 @@ export class Trajectory implements View {
     });
     this.element = section(
       "trajectory",
-      "Trajectory",
+      this.title,
       this.caption,
       this.plot.controls(),
       this.legend.element,
       this.plot.element,
+      this.revisits,
     );
   }
 
@@ -69,9 +79,10 @@ export class Trajectory implements View {
           return x === null || y === null ? null : { x, y };
         })
       : ringOf(frames);
+    this.title.textContent = positions ? "Trajectory" : "Loops";
     this.caption.textContent = positions
       ? `The trajectory in metres, in the plane of its largest extent (${positions.axes.join(" and ")}). A line connects each query with its match. Click a frame to see its pair.`
-      : "The frames on a ring, clockwise from the top. A line connects each query with its match. --poses FILE shows the real trajectory.";
+      : "The frames on a ring, clockwise from the top. A band connects the frames of a revisit with their matches, a line a single loop. --poses FILE shows the trajectory.";
     if (model.loopsElsewhere().length > 0) {
       this.caption.append(
         " A loop into another session has no line, because its match is not one of these frames.",
@@ -79,7 +90,29 @@ export class Trajectory implements View {
     }
     this.element.classList.toggle("ring", this.isRing);
     this.legend.show(model);
+    this.listRevisits(model);
     this.plot.reset();
+  }
+
+  /** The longest revisits, in order. */
+  private listRevisits({ run }: RunModel): void {
+    const longest = [...run.revisits].sort((a, b) => b.loops - a.loops).slice(0, kListed);
+    const others = run.revisits.length - longest.length;
+    const entries = run.revisits
+      .filter((revisit) => longest.includes(revisit))
+      .map(({ query, match, loops }) => {
+        const text = `${spanText(query)} is ${spanText(match)}`;
+        const title = `${format.counted(loops, "loop")}; show the first`;
+        return html(
+          "li",
+          {},
+          button({ title }, () => this.store.select(query[0]), text),
+        );
+      });
+    if (others > 0)
+      entries.push(html("li", {}, `and ${format.counted(others, "shorter revisit")}`));
+    this.revisits.replaceChildren(...entries);
+    this.revisits.hidden = entries.length === 0;
   }
 
   showSelection(_: Selection): void {
@@ -103,11 +136,12 @@ export class Trajectory implements View {
     return { x: range(x), y: range(y) };
   }
 
-  private draw(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private draw(ctx: Pen, to: Projection, theme: Theme): void {
     this.drawPath(ctx, to, theme);
     const model = this.store.model;
     const count = model.framesIn("loops").length + model.framesIn("missed").length;
     const radius = markRadius(count) * to.ratio;
+    if (this.isRing) this.drawBands(ctx, to, theme);
     for (const verdict of kMarked) {
       this.drawLoops(ctx, to, theme, verdict, count);
     }
@@ -122,8 +156,8 @@ export class Trajectory implements View {
     this.drawEnds(ctx, to, theme);
   }
 
-  private drawPath(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
-    const path = new Path2D();
+  private drawPath(ctx: Pen, to: Projection, theme: Theme): void {
+    const path = new Path();
     let isDown = false;
     for (const place of this.places) {
       if (place && isDown) path.lineTo(to.x(place.x), to.y(place.y));
@@ -137,15 +171,16 @@ export class Trajectory implements View {
   }
 
   private drawLoops(
-    ctx: CanvasRenderingContext2D,
+    ctx: Pen,
     to: Projection,
     theme: Theme,
     verdict: (typeof kMarked)[number],
     count: number,
   ): void {
     const model = this.store.model;
-    const path = new Path2D();
+    const path = new Path();
     for (const frame of model.loopsMarked(verdict)) {
+      if (this.isRing && verdict !== "wrong" && model.isInLongRevisit(frame)) continue;
       const from = this.places[frame];
       const match = this.places[model.match(frame) ?? -1];
       if (from && match) this.addLink(path, to, from, match, count);
@@ -157,10 +192,53 @@ export class Trajectory implements View {
     ctx.globalAlpha = 1;
   }
 
+  /** Long revisits as bands from their queries to their matches. */
+  private drawBands(ctx: Pen, to: Projection, theme: Theme): void {
+    const model = this.store.model;
+    const colour = model.run.evaluation ? theme.right : theme.loop;
+    ctx.fillStyle = colour;
+    ctx.strokeStyle = colour;
+    ctx.lineWidth = to.ratio;
+    for (const revisit of model.longRevisits) {
+      const band = this.bandOf(revisit, to);
+      ctx.globalAlpha = 0.22;
+      ctx.fill(band);
+      ctx.globalAlpha = 0.7;
+      ctx.stroke(band);
+    }
+    ctx.globalAlpha = 1;
+  }
+
+  /** Along the ring and across it, and back. */
+  private bandOf({ query, match }: Revisit, to: Projection): Path {
+    const path = new Path();
+    const along = ([a, b]: readonly [number, number]) => {
+      const step = a <= b ? 1 : -1;
+      for (let frame = a; frame !== b + step; frame += step) {
+        const place = this.places[frame];
+        if (place) path.lineTo(to.x(place.x), to.y(place.y));
+      }
+    };
+    const across = (a: number, b: number) => {
+      const [from, end] = [this.places[a], this.places[b]];
+      if (from && end) this.addCurve(path, to, from, end, kCurveSteps);
+    };
+    const begin = this.places[query[0]];
+    if (begin) path.moveTo(to.x(begin.x), to.y(begin.y));
+    along(query);
+    across(query[1], match[1]);
+    along([match[1], match[0]]);
+    across(match[0], query[0]);
+    return path;
+  }
+
   /** Straight in the plane; curved towards the centre on the ring, so that chords separate. */
-  private addLink(path: Path2D, to: Projection, from: Point, match: Point, count: number): void {
+  private addLink(path: Path, to: Projection, from: Point, match: Point, count: number): void {
     path.moveTo(to.x(from.x), to.y(from.y));
-    const steps = this.isRing && count < kManyLoops ? kCurveSteps : 1;
+    this.addCurve(path, to, from, match, this.isRing && count < kManyLoops ? kCurveSteps : 1);
+  }
+
+  private addCurve(path: Path, to: Projection, from: Point, match: Point, steps: number): void {
     const bend = Math.min(1, Math.hypot(match.x - from.x, match.y - from.y));
     for (let step = 1; step <= steps; ++step) {
       const t = step / steps;
@@ -171,7 +249,7 @@ export class Trajectory implements View {
     }
   }
 
-  private drawEnds(ctx: CanvasRenderingContext2D, to: Projection, theme: Theme): void {
+  private drawEnds(ctx: Pen, to: Projection, theme: Theme): void {
     const known = this.places.filter((place) => place !== null);
     const ends: [Point | undefined, string][] = [
       [known[0], "start"],

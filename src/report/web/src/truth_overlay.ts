@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 
 import { html } from "./dom.ts";
+import { Path, type Pen } from "./pen.ts";
 import type { Projection } from "./projection.ts";
 
 /** The cells of the matrix with a true pair, and their outline. */
@@ -59,7 +60,7 @@ export function truthOverlay(
 }
 
 export function drawTruth(
-  ctx: CanvasRenderingContext2D,
+  ctx: Pen,
   to: Projection,
   truth: TruthOverlay,
   framesPerCell: number,
@@ -70,7 +71,7 @@ export function drawTruth(
   if (onPicture) {
     ctx.drawImage(truth.fill, to.x(0), to.y(0), to.x(size) - to.x(0), to.y(size) - to.y(0));
   }
-  const path = new Path2D();
+  const path = new Path();
   for (let i = 0; i + 3 < truth.edges.length; i += 4) {
     const [x1, y1, x2, y2] = truth.edges.slice(i, i + 4) as [number, number, number, number];
     path.moveTo(to.x(x1 * framesPerCell), to.y(y1 * framesPerCell));

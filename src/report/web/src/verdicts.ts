@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 
 import { svg } from "./dom.ts";
+import { Path, type Pen } from "./pen.ts";
 import type { Verdict } from "./report_data.ts";
 import type { Theme } from "./theme.ts";
 
@@ -89,7 +90,7 @@ export interface Point {
 
 /** Draws all marks of one verdict at once; `radius` and points in canvas pixels. */
 export function drawMarks(
-  ctx: CanvasRenderingContext2D,
+  ctx: Pen,
   verdict: Marked,
   points: readonly Point[],
   radius: number,
@@ -98,9 +99,8 @@ export function drawMarks(
 ): void {
   if (points.length === 0) return;
   const mark = kMarks[verdict];
-  const unit = new Path2D(mark.path);
-  const all = new Path2D();
-  for (const { x, y } of points) all.addPath(unit, { a: radius, d: radius, e: x, f: y });
+  const all = new Path();
+  for (const { x, y } of points) all.stamp(mark.path, radius, x, y);
   ctx.lineJoin = "round";
   ctx.lineCap = "butt";
   const line = Math.max(1, radius * (mark.style === "filled" ? 0.3 : 0.45));

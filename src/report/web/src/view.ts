@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 
-import { html } from "./dom.ts";
+import { type Child, html } from "./dom.ts";
 import type { RunModel } from "./run_model.ts";
 import type { Selection } from "./store.ts";
 
@@ -17,7 +17,7 @@ export interface View {
 /** A titled part of the page. */
 export function section(
   id: string,
-  title: string,
+  title: Child,
   caption: HTMLElement,
   controls: HTMLElement | null,
   ...content: (Node | null)[]
