@@ -22,7 +22,7 @@ struct SessionFlags {
   std::string config;
   std::vector<std::string> settings;  ///< "section.field=value"
   int threads = 0;                    ///< at most one a core; 0 = as many
-  bool open = false;  ///< the report, in the browser
+  bool open = false;                  ///< the report, in the browser
   ReportOptions report;
 
   void add_to(CLI::App& command);
