@@ -138,10 +138,10 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
 /// A run, from its folder to its end.
 class RecordedRun {
  public:
-  RecordedRun(RunInput& input, const RunRequest& request, const FramesRead& expected)
+  RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected)
       : input_(input),
         request_(request),
-        frames_(expected),
+        frames_(std::move(expected)),
         map_(open_map(input, request)),
         detector_(std::in_place, request.options, map_),
         record_(record_of(input, request)),

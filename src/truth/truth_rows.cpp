@@ -30,7 +30,7 @@ void check_pose_each(const std::string& path, std::size_t poses, const FramesRea
 
 void check_rows(const std::string& path, std::size_t rows, const char* things,
                 const FramesRead& frames) {
-  if (frames.times_s.size() == 0) return;
+  if (frames.times_s.empty()) return;
   const std::size_t last = (frames.times_s.size() - 1) * static_cast<std::size_t>(frames.every);
   if (last >= rows) {
     throw Error(ErrorKind::input,
@@ -46,7 +46,7 @@ void check_rows(const std::string& path, std::size_t rows, const char* things,
 }
 
 void check_frame(const std::string& path, int frame, const FramesRead& frames) {
-  if (!frames.all || frames.times_s.size() == 0) return;
+  if (!frames.all || frames.times_s.empty()) return;
   if (static_cast<std::size_t>(frame) < most_frames(frames)) return;
   throw Error(ErrorKind::input,
               fmt::format("'{}' tells of frame {}, but the sequence has {} frames, counted from 0: "
