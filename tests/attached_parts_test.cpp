@@ -92,6 +92,22 @@ TEST(AttachedParts, ACameraThatStandsStillHasNone) {
   EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
 }
 
+TEST(AttachedParts, ANoisyCameraThatStandsStillHasNone) {
+  Random random;
+  AttachedParts parts;
+  const Features scene = view_with_bonnet(random);
+  for (int i = 0; i < 40; ++i) {
+    Features features = scene;
+    // Every other feature is another one.
+    for (std::size_t k = 0; k < features.keypoints.size(); k += 2) {
+      features.keypoints[k].x_px = static_cast<float>(random.between(0, kViewWidth_px - 1));
+      features.keypoints[k].y_px = static_cast<float>(random.between(0, kViewHeight_px - 1));
+    }
+    EXPECT_EQ(num_kept(parts, features), features.keypoints.size()) << i;
+    note_view(parts, features);
+  }
+}
+
 TEST(AttachedParts, AreForgottenWhereTheyAreNoLongerSeen) {
   Random random;
   AttachedParts parts;

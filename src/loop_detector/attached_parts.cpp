@@ -3,16 +3,20 @@
 #include "attached_parts.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
 #include <limits>
 
 namespace loopbit {
 namespace {
 
 constexpr int kReach_px = 2;
+/// The image in 4 x 4 cells: a camera that stands still repeats a third of the features of most
+/// cells or more, even in noise; one that moves repeats less than a fifth by chance, but for what
+/// is attached.
+constexpr int kCells = 4;
 
 /// A spot is attached if half of the latest 16 views have a feature there; at the beginning of a
 /// run, half of those so far, but at least 4. By chance one of 600 features lies within 2 px of a
@@ -110,10 +114,7 @@ void AttachedParts::remember(const Features& features) {
     beside_ = {};
   }
   const std::vector<Keypoint>& keypoints = features.keypoints;
-  const auto unmoved = std::count_if(keypoints.begin(), keypoints.end(), [&](const Keypoint& k) {
-    return (std::rotr(views_at(k), num_views_ - 1) & 1U) != 0;
-  });
-  if (2 * unmoved >= std::ssize(keypoints)) return;
+  if (shows_last_view(keypoints)) return;
   note(keypoints);
   find_parts(keypoints);
 }
@@ -136,6 +137,26 @@ bool AttachedParts::is_attached(const Keypoint& keypoint) const {
   constexpr Views kLatest = (1U << static_cast<unsigned>(kViewsBeside)) - 1U;
   const Views latest = std::rotr(views_at(keypoint), num_views_ - kViewsBeside) & kLatest;
   return 2 * std::popcount(latest) >= kViewsBeside;
+}
+
+bool AttachedParts::shows_last_view(const std::vector<Keypoint>& keypoints) const {
+  struct Cell {
+    int features = 0;
+    int unmoved = 0;
+  };
+  std::array<Cell, kCells * kCells> cells;
+  for (const Keypoint& keypoint : keypoints) {
+    const cv::Point pixel = content_pixel(keypoint, size_px_) * kCells / kContentSide;
+    Cell& cell = cells.at(static_cast<std::size_t>(pixel.y * kCells + pixel.x));
+    ++cell.features;
+    if ((std::rotr(views_at(keypoint), num_views_ - 1) & 1U) != 0) ++cell.unmoved;
+  }
+  const auto seen =
+      std::count_if(cells.begin(), cells.end(), [](const Cell& cell) { return cell.features > 0; });
+  const auto unmoved = std::count_if(cells.begin(), cells.end(), [](const Cell& cell) {
+    return cell.features > 0 && 3 * cell.unmoved >= cell.features;
+  });
+  return 2 * unmoved >= seen;
 }
 
 void AttachedParts::note(const std::vector<Keypoint>& keypoints) {

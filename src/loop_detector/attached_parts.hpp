@@ -24,9 +24,9 @@ class AttachedParts {
   /// Takes the memory that the next remember() of such features needs, so that it does not throw.
   void reserve_next(const Features& features);
 
-  /// Notes a frame by its features, before any were removed. A frame with most features where the
-  /// last one noted has them shows the same view, and changes nothing: a camera that stands still
-  /// has no attached parts. Another working size begins anew.
+  /// Notes a frame by its features, before any were removed. One that shows the same view as the
+  /// last one noted changes nothing: a camera that stands still has no attached parts. Another
+  /// working size begins anew.
   void remember(const Features& features);
 
  private:
@@ -36,6 +36,7 @@ class AttachedParts {
   [[nodiscard]] std::size_t index_of(int x_px, int y_px) const;
   [[nodiscard]] Views views_at(const Keypoint& keypoint) const;
   [[nodiscard]] bool is_attached(const Keypoint& keypoint) const;
+  [[nodiscard]] bool shows_last_view(const std::vector<Keypoint>& keypoints) const;
   void note(const std::vector<Keypoint>& keypoints);
   void find_parts(const std::vector<Keypoint>& keypoints);
 
