@@ -144,10 +144,11 @@ bool AttachedParts::shows_last_view(const std::vector<Keypoint>& keypoints) cons
     int features = 0;
     int unmoved = 0;
   };
-  std::array<Cell, kCells * kCells> cells;
+  std::array<Cell, std::size_t{kCells} * kCells> cells;
   for (const Keypoint& keypoint : keypoints) {
     const cv::Point pixel = content_pixel(keypoint, size_px_) * kCells / kContentSide;
-    Cell& cell = cells.at(static_cast<std::size_t>(pixel.y * kCells + pixel.x));
+    const int index = pixel.y * kCells + pixel.x;
+    Cell& cell = cells.at(static_cast<std::size_t>(index));
     ++cell.features;
     if ((std::rotr(views_at(keypoint), num_views_ - 1) & 1U) != 0) ++cell.unmoved;
   }
