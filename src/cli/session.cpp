@@ -67,6 +67,14 @@ std::optional<Error> score(const Session& session, RecordedRun& recorded) {
   return fault;
 }
 
+void present(const RecordedRun& recorded, const SessionFlags& flags) {
+  const RunFolder& folder = recorded.folder();
+  if (!flags.no_report) {
+    write_report(folder.report_path(), {report_run(folder.path())}, flags.report);
+  }
+  print_summary(recorded.record(), folder, !flags.no_report);
+}
+
 }  // namespace
 
 void SessionFlags::add_to(CLI::App& command) {
@@ -172,13 +180,10 @@ int run_session(Session session, const SessionFlags& flags) {
   }
   const std::optional<Error> fault = score(session, recorded);
   recorded.finish(stop_requested ? "interrupt" : "end");
-  const RunFolder& folder = recorded.folder();
-  if (!flags.no_report)
-    write_report(folder.report_path(), {report_run(folder.path())}, flags.report);
-  print_summary(recorded.record(), folder, !flags.no_report);
+  present(recorded, flags);
   if (fault && !stop_requested) throw Error(fault->kind(), fault->what());
   if (fault) tell(fmt::format("loopbit: {}\n", fault->what()));
-  if (flags.open && !stop_requested) open_page(folder.report_path());
+  if (flags.open && !stop_requested) open_page(recorded.folder().report_path());
   return stop_requested ? interrupted : success;
 }
 

@@ -218,8 +218,7 @@ class LoopDetector::Impl {
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
   Detection skip(std::optional<double> timestamp_s) {
-    const Detection detection{
-        .frame = size(), .timestamp_s = timestamp_s, .status = Status::unreadable};
+    Detection detection{.frame = size(), .timestamp_s = timestamp_s, .status = Status::unreadable};
     add_place(BinaryContent{}, Features{}, detection, cv::Mat());
     return detection;
   }
