@@ -1,10 +1,11 @@
-# loopbit_part(NAME HEADERS ... SOURCES ... LINKS ... PRIVATE_LINKS ...)
+# loopbit_part(NAME HEADERS ... SHARED_HEADERS ... SOURCES ... LINKS ... PRIVATE_LINKS ...)
 #
 # A part of the library: sources of its own, public headers in include/loopbit/, and the parts it may
 # know. A part that does not name another in LINKS cannot include its headers, which is how the
-# include direction is held. All parts of one library are shipped as that one library.
+# include direction is held. All parts of one library are shipped as that one library. HEADERS are
+# installed; SHARED_HEADERS only serve parts in other libraries.
 function(loopbit_part name)
-  cmake_parse_arguments(PART "" "" "HEADERS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
+  cmake_parse_arguments(PART "" "" "HEADERS;SHARED_HEADERS;SOURCES;LINKS;PRIVATE_LINKS" ${ARGN})
   set(target loopbit_${name})
   add_library(${target} OBJECT ${PART_SOURCES})
   target_include_directories(
@@ -15,7 +16,8 @@ function(loopbit_part name)
     PRIVATE ${PART_PRIVATE_LINKS} loopbit_warnings)
   set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON
                                              LOOPBIT_OBJECTS $<TARGET_OBJECTS:${target}>)
-  loopbit_export_only_public(${target} "${PART_HEADERS}")
+  set(exported ${PART_HEADERS} ${PART_SHARED_HEADERS})
+  loopbit_export_only_public(${target} "${exported}")
   list(TRANSFORM PART_HEADERS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/include/loopbit/)
   install(FILES ${PART_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/loopbit COMPONENT dev)
 endfunction()

@@ -5,9 +5,10 @@
 
 A source is skipped if nothing that affects its result has changed since it last passed: its
 compile command, the .clang-tidy file, clang-tidy itself, and the content of our files that it
-includes (as the compiler reported them to Ninja). The others are checked several at a time, because
-they share most of the time for headers. --all also checks tests, benchmarks and the Python module,
-and runs the static analyzer. It takes three times as long and checks one source at a time.
+includes (as the compiler reported them to Ninja). The others are checked together, as far as they can
+be compiled together, because most of the time goes into the headers that they share. --all also
+checks tests, benchmarks and the Python module, and runs the static analyzer. It takes several times as
+long and checks one source at a time.
 """
 
 import argparse
@@ -23,6 +24,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 TIDY = "clang-tidy-14"
+CLANG = "clang++-14"
 # The static analyzer takes as long as all other checks, and a minute for a large test. The other
 # checks listed here take a quarter of the remaining time and find rare faults.
 QUICK = ["--checks=-clang-analyzer-*,-bugprone-reserved-identifier,-bugprone-stringview-nullptr,"
@@ -30,7 +32,6 @@ QUICK = ["--checks=-clang-analyzer-*,-bugprone-reserved-identifier,-bugprone-str
          "-modernize-use-transparent-functors,-modernize-deprecated-ios-base-aliases"]
 # A source includes no other, but a batch does.
 BATCHED = ["--checks=" + QUICK[0].split("=")[1] + ",-bugprone-suspicious-include"]
-BATCH_SIZE = 30
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
@@ -94,7 +95,7 @@ def split_flags(entry):
             places.append((part,))
         elif part in ("-o", "-include"):
             next(command)
-        elif part not in ("-c", entry["file"], "-fPIC") and not part.startswith("-fvisibility"):
+        elif part not in ("-c", entry["file"], "-fPIC") and not part.startswith(("-fvisibility", "-O")):
             others.append(part)
     return places, tuple(others)
 
@@ -104,37 +105,59 @@ def flags_of(places, others):
     return [*itertools.chain(*dict.fromkeys(itertools.chain(*places))), *others]
 
 
-def check_batch(batch, pending, build):
-    """As check(), of several sources together, with flags for all. Where that finds faults, or they
-    cannot be compiled together, by halves."""
-    sources, flags = batch
-    if len(sources) == 1:
-        return [check(sources[0], pending[sources[0]], flags, QUICK)]
+def written(sources, build):
+    """A source that includes those given."""
     text = "".join(f'#include "{source}"\n' for source in sources)
-    together = build / "tidy_batches" / f"{hashlib.sha256(text.encode()).hexdigest()}.cpp"
-    together.write_text(text)
+    file = build / "tidy_batches" / f"{hashlib.sha256(text.encode()).hexdigest()}.cpp"
+    file.write_text(text)
+    return file
+
+
+def files_with_faults(output):
+    """The files that clang or clang-tidy says something of."""
+    return set(re.findall(r"^(/.+?):\d+:\d+: (?:fatal )?(?:error|warning):", output, re.MULTILINE))
+
+
+def check_batch(batch, pending, build):
+    """As check(), of several sources together, with flags for all. Those in which that finds faults are
+    checked again by themselves: a batch may show some that they do not have."""
+    sources, flags = batch
     result = subprocess.run([TIDY, "--quiet", *BATCHED, f"--config-file={ROOT}/.clang-tidy",
-                             together, "--", *flags], capture_output=True)
-    together.unlink()
-    if result.returncode == 0:
-        for source in sources:
+                             written(sources, build), "--", *flags], capture_output=True, text=True)
+    faulty = files_with_faults(result.stdout) if result.returncode != 0 else set()
+    if result.returncode != 0 and not (faulty and faulty <= set(map(str, sources))):
+        return [result.stdout or result.stderr]  # a header's
+    for source in sources:
+        if str(source) not in faulty:
             pending[source].touch()
-        return [""] * len(sources)
-    middle = len(sources) // 2
-    return (check_batch((sources[:middle], flags), pending, build)
-            + check_batch((sources[middle:], flags), pending, build))
+    return [check(source, pending[source], flags, QUICK) for source in sources if str(source) in faulty]
 
 
-def batches(todo):
-    """Sources that may be compiled together, and the flags for that."""
+def that_compile_together(sources, flags, build):
+    """Some of the sources. Two cannot be compiled as one if both define the same name."""
+    while len(sources) > 1:
+        result = subprocess.run([CLANG, "-fsyntax-only", "-ferror-limit=0", "-w",
+                                 written(sources, build), *flags], capture_output=True, text=True)
+        if result.returncode == 0:
+            break
+        faulty = files_with_faults(result.stderr)
+        good = [source for source in sources if str(source) not in faulty]
+        sources = good if 0 < len(good) < len(sources) else sources[:len(sources) // 2]
+    return sources
+
+
+def batches(todo, build):
+    """All sources, as many together as can be, and the flags for each lot."""
     by_others = {}
     for source, entry in todo.items():
         places, others = split_flags(entry)
-        by_others.setdefault(others, []).append((source, places))
-    for others, entries in by_others.items():
-        for first in range(0, len(entries), BATCH_SIZE):
-            batch = entries[first:first + BATCH_SIZE]
-            yield [source for source, _ in batch], flags_of([places for _, places in batch], others)
+        by_others.setdefault(others, {})[source] = places
+    for others, places in by_others.items():
+        while places:
+            flags = flags_of(places.values(), others)
+            batch = that_compile_together(list(places), flags, build)
+            yield batch, flags
+            places = {source: places[source] for source in places if source not in batch}
 
 
 def main():
@@ -185,9 +208,7 @@ def main():
             findings = list(pool.map(check_alone, todo))
         else:
             (build / "tidy_batches").mkdir(exist_ok=True)
-            # Those of the command, which come last, take longest.
-            found = pool.map(lambda batch: check_batch(batch, pending, build),
-                             reversed(list(batches(todo))))
+            found = pool.map(lambda batch: check_batch(batch, pending, build), batches(todo, build))
             findings = [finding for of_batch in found for finding in of_batch]
     print("".join(findings), end="")
     failed = sum(map(bool, findings))

@@ -268,15 +268,16 @@ TEST(Evaluate, IsAsDefinedOnRandomLists) {
 
 TEST(WilsonInterval, AgreesWithPublishedValues) {
   // Newcombe 1998, table I: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
-  const auto expect = [](Interval interval, double low, double high) {
-    EXPECT_NEAR(interval.low, low, 5e-5);
-    EXPECT_NEAR(interval.high, high, 5e-5);
+  const auto expect = [](int right, int loops, double low, double high) {
+    const DecisionCounts counts{.right = right, .wrong = loops - right};
+    EXPECT_NEAR(counts.precision_interval().low, low, 1e-4);
+    EXPECT_NEAR(counts.precision_interval().high, high, 1e-4);
   };
-  expect(wilson_interval(81, 263), 0.2553, 0.3662);
-  expect(wilson_interval(15, 148), 0.0624, 0.1605);
-  expect(wilson_interval(0, 20), 0.0000, 0.1611);
-  expect(wilson_interval(1, 29), 0.0061, 0.1718);
-  expect(wilson_interval(0, 0), 0.0, 1.0);
+  expect(81, 263, 0.2553, 0.3662);
+  expect(15, 148, 0.0624, 0.1605);
+  expect(0, 20, 0.0000, 0.1611);
+  expect(1, 29, 0.0061, 0.1718);
+  expect(0, 0, 0.0, 1.0);
 }
 
 TEST(EvaluationJson, SaysWhatTheEvaluationDoes) {

@@ -21,11 +21,10 @@ double shifted_similarity(const Contents& shifted, int query_count, const Binary
   return best == 0 ? 0.0 : static_cast<double>(best) / std::max(query_count, count(place));
 }
 
-bool is_within_limits(const BinaryContent& query, const BinaryContent& place,
-                      const RetrievalOptions& options) {
+bool is_within_limit(const BinaryContent& query, const BinaryContent& place,
+                     const RetrievalOptions& options) {
   const cv::Point2d apart = center(query) - center(place);
-  return std::abs(count(query) - count(place)) <= options.max_count_difference &&
-         std::hypot(apart.x, apart.y) <= options.max_center_distance_px;
+  return std::hypot(apart.x, apart.y) <= options.max_center_distance_px;
 }
 
 }  // namespace
@@ -37,7 +36,7 @@ std::vector<Candidate> full_scan(const Contents& places, const BinaryContent& qu
   for (PlaceId i = 0; i < end; ++i) {
     const BinaryContent& place = places[static_cast<std::size_t>(i)];
     const double xi = shifted_similarity(shifted, count(query), place);
-    if (xi > 0 && xi >= options.min_similarity && is_within_limits(query, place, options)) {
+    if (xi > 0 && xi >= options.min_similarity && is_within_limit(query, place, options)) {
       left.push_back({i, xi});
     }
   }

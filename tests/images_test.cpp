@@ -2,14 +2,12 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
@@ -19,6 +17,8 @@
 #include "loopbit/error.hpp"
 #include "loopbit/folder_watch.hpp"
 #include "loopbit/image_source.hpp"
+
+#include "test_support.hpp"
 
 namespace loopbit {
 namespace {
@@ -80,43 +80,14 @@ void expect_all_readable(const std::vector<Frame>& frames) {
   }
 }
 
-/// Checks that opening `input` throws an Error of `kind` whose sentence has all of `parts`.
 void expect_open_error(const std::string& input, ErrorKind kind,
-                       const std::vector<std::string>& parts) {
-  try {
-    static_cast<void>(open_source(input));
-    ADD_FAILURE() << input << " was opened";
-  } catch (const Error& e) {
-    EXPECT_EQ(e.kind(), kind) << e.what();
-    for (const std::string& part : parts) {
-      EXPECT_NE(std::string_view(e.what()).find(part), std::string_view::npos)
-          << "no '" << part << "' in: " << e.what();
-    }
-  }
+                       std::initializer_list<std::string_view> parts) {
+  test::expect_error(kind, parts, [&] { (void)open_source(input); });
 }
 
-class Images : public testing::Test {
+class Images : public test::ScratchTest {
  protected:
-  void SetUp() override {
-    std::string pattern = testing::TempDir() + "loopbit_images_XXXXXX";
-    ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-    root_ = pattern;
-  }
-
-  void TearDown() override { fs::remove_all(root_); }
-
-  [[nodiscard]] std::string path(const std::string& name = "") const {
-    return name.empty() ? root_.string() : (root_ / name).string();
-  }
-
-  /// Writes a file, and the folders it lies in.
-  void write(const std::string& name, std::string_view content) const {
-    fs::create_directories((root_ / name).parent_path());
-    std::ofstream stream(root_ / name, std::ios::binary);
-    stream.write(content.data(), static_cast<std::streamsize>(content.size()));
-    ASSERT_TRUE(stream.good()) << name;
-  }
-
+  using ScratchTest::write;
   void write(const std::string& name, const Bytes& bytes) const {
     write(name, std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
   }
@@ -181,9 +152,6 @@ class Images : public testing::Test {
     }
     return writer.isOpened();
   }
-
- private:
-  fs::path root_;
 };
 
 // Folders of images
@@ -675,10 +643,10 @@ TEST_F(Images, CutOffVideoEndsEarlyAndSaysSo) {
 TEST_F(Images, TheEarlyEndIsPassedOnFromTheEnd) {
   write_video("v.avi", 40);
   fs::resize_file(path("v.avi"), fs::file_size(path("v.avi")) / 2);
-  const auto ahead = prefetch(subsample(open_source(path("v.avi")), 3, 0), 2);
+  const auto ahead = prefetch(subsample(open_source(path("v.avi")), {.every = 3}), 2);
   EXPECT_GT(read_all(*ahead).size(), 2U);
   EXPECT_NE(ahead->early_end(), "");
-  const auto limited = prefetch(subsample(open_source(path("v.avi")), 3, 2), 2);
+  const auto limited = prefetch(subsample(open_source(path("v.avi")), {.every = 3, .limit = 2}), 2);
   EXPECT_EQ(read_all(*limited).size(), 2U);
   EXPECT_EQ(limited->early_end(), "") << "what is missing was not asked for";
 }
@@ -715,7 +683,7 @@ TEST_F(Images, OnlyACutVideoIsCalledCut) {
 TEST_F(Images, TheNumberOfImagesIsSureAndThatOfAVideoIsNot) {
   write_images({"images/0.png", "images/1.png", "images/2.png"});
   write_video("v.avi", 4);
-  const auto every_second = subsample(open_source(path("images")), 2, 0);
+  const auto every_second = subsample(open_source(path("images")), {.every = 2});
   EXPECT_EQ(exact_size(*every_second, path("images")), 2U);
   write("list.txt", "images/0.png\nimages/1.png\n");
   EXPECT_EQ(exact_size(*open_source(path("list.txt")), path("list.txt")), 2U);
@@ -729,7 +697,7 @@ TEST_F(Images, TheNumberOfImagesIsSureAndThatOfAVideoIsNot) {
 TEST_F(Images, SubsampleTakesEveryNthUpToTheLimit) {
   write_images({"0.png", "1.png", "2.png", "3.png", "4.png", "5.png", "6.png"});
   struct Case {
-    std::size_t every, limit;
+    int every, limit;
     std::vector<std::string> expected;
   };
   const std::vector<std::string> all = {"0.png", "1.png", "2.png", "3.png",
@@ -738,7 +706,7 @@ TEST_F(Images, SubsampleTakesEveryNthUpToTheLimit) {
        {Case{1, 0, all}, Case{1, 2, {"0.png", "1.png"}}, Case{3, 0, {"0.png", "3.png", "6.png"}},
         Case{4, 0, {"0.png", "4.png"}}, Case{3, 2, {"0.png", "3.png"}},
         Case{2, 9, {"0.png", "2.png", "4.png", "6.png"}}, Case{100, 0, {"0.png"}}}) {
-    const auto source = subsample(open_source(path()), c.every, c.limit);
+    const auto source = subsample(open_source(path()), {c.every, c.limit});
     EXPECT_EQ(source->size(), c.expected.size()) << c.every << ", " << c.limit;
     EXPECT_EQ(names(read_all(*source)), c.expected) << c.every << ", " << c.limit;
   }
@@ -746,7 +714,7 @@ TEST_F(Images, SubsampleTakesEveryNthUpToTheLimit) {
 
 TEST_F(Images, SubsampleSkipsInItsOwnFrames) {
   write_images({"0.png", "1.png", "2.png", "3.png", "4.png", "5.png", "6.png"});
-  const auto source = subsample(open_source(path()), 2, 3);
+  const auto source = subsample(open_source(path()), {.every = 2, .limit = 3});
   EXPECT_EQ(source->description(), "folder of images, 1 frame in 2, at most 3 frames");
   Frame frame;
   EXPECT_TRUE(source->skip());
@@ -758,7 +726,7 @@ TEST_F(Images, SubsampleSkipsInItsOwnFrames) {
 
 TEST_F(Images, SubsampleNestsAndReadsVideos) {
   write_video("v.avi", 12);
-  const auto source = subsample(subsample(open_source(path("v.avi")), 2, 0), 2, 0);
+  const auto source = subsample(subsample(open_source(path("v.avi")), {.every = 2}), {.every = 2});
   const std::vector<Frame> frames = read_all(*source);
   EXPECT_EQ(names(frames), (std::vector<std::string>{"frame 0", "frame 4", "frame 8"}));
   EXPECT_NEAR(frames[1].timestamp_s.value(), 0.4, 1e-6);
@@ -767,12 +735,9 @@ TEST_F(Images, SubsampleNestsAndReadsVideos) {
 
 TEST_F(Images, SubsampleByZeroIsAnError) {
   write_images({"0.png"});
-  try {
-    static_cast<void>(subsample(open_source(path()), 0, 0));
-    FAIL() << "no error";
-  } catch (const Error& e) {
-    EXPECT_EQ(e.kind(), ErrorKind::option);
-    EXPECT_STREQ(e.what(), "every is 0, but must be 1 (all frames) or more.");
+  for (const Sampling sampling : {Sampling{.every = 0}, Sampling{.limit = -1}}) {
+    test::expect_error(ErrorKind::option, {"every must be at least 1, and limit 0"},
+                       [&] { (void)subsample(open_source(path()), sampling); });
   }
 }
 
@@ -785,7 +750,7 @@ class UnknownSize final : public ImageSource {
 };
 
 TEST_F(Images, SubsampleOfUnknownSizeIsUnknownButEnds) {
-  const auto source = subsample(std::make_unique<UnknownSize>(), 1000, 3);
+  const auto source = subsample(std::make_unique<UnknownSize>(), {.every = 1000, .limit = 3});
   EXPECT_FALSE(source->size().has_value());
   EXPECT_EQ(read_all(*source).size(), 3U);
 }

@@ -37,6 +37,11 @@ def loopbit(*arguments, environment=None, **options):
     )
 
 
+def complaints(ran):
+    """What a run says in stderr, but for the progress that it shows if it takes more than seconds."""
+    return [line for line in ran.stderr.splitlines() if " frames/s, " not in line]
+
+
 def rows(folder):
     with open(folder / "loops.csv", newline="") as file:
         return list(csv.DictReader(file))

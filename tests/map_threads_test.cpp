@@ -82,7 +82,7 @@ TEST_F(MapThreads, ADetectorAddsWhileReadersReadTheFile) {
 TEST_F(MapThreads, PendingFeaturesAreGivenWhileTheyAreCommitted) {
   constexpr int kFrames = 400;
   const std::string map_path = path("map.db");
-  MapSession session;
+  loopbit::MapSession session;
   session.session = 1;
   BatchWriter writer(open_map_for_writing(map_path), std::move(session), 1, {});
   std::vector<std::shared_ptr<const Features>> added;

@@ -149,12 +149,6 @@ TEST(PlaceIndex, ToleratesShiftsUpToTheOption) {
   }
 }
 
-TEST(PlaceIndex, LimitsTheDifferenceOfCounts) {
-  const PlaceIndex index = index_of({first_bits(90), first_bits(89), first_bits(111)});
-  const RetrievalOptions options{.min_spacing = 1, .max_count_difference = 10};
-  EXPECT_EQ(index.query(first_bits(100), 3, options), (std::vector<Candidate>{{0, 0.9}}));
-}
-
 TEST(PlaceIndex, LimitsTheDistanceOfCenters) {
   BinaryContent query;
   query.rows[10] = 0xFF;
@@ -165,12 +159,17 @@ TEST(PlaceIndex, LimitsTheDistanceOfCenters) {
   EXPECT_EQ(index.query(query, 1, {.max_center_distance_px = 1.999}).size(), 0U);
 }
 
-TEST(PlaceIndex, PlacesBeyondTheLimitsKeepNobodyOut) {
-  const PlaceIndex index = index_of({first_bits(100), first_bits(80)});
-  // The first is no candidate, for its count, and so its neighbour may be one.
-  const BinaryContent query = first_bits(80);
-  const RetrievalOptions options{.min_spacing = 2, .max_count_difference = 10};
-  EXPECT_EQ(index.query(query, 2, options), (std::vector<Candidate>{{1, 1.0}}));
+TEST(PlaceIndex, PlacesBeyondTheLimitKeepNobodyOut) {
+  BinaryContent query;
+  query.rows[10] = 0xFFFF;
+  BinaryContent off_center = query;
+  off_center.rows[63] = 1;
+  BinaryContent smaller;
+  smaller.rows[10] = 0x7FFE;
+  const PlaceIndex index = index_of({off_center, smaller});
+  // The first is more similar, but no candidate, and so its neighbour may be one.
+  const RetrievalOptions options{.min_spacing = 2, .max_center_distance_px = 2.0};
+  EXPECT_EQ(index.query(query, 2, options), (std::vector<Candidate>{{1, 0.875}}));
 }
 
 TEST(PlaceIndex, ContentsNeverMove) {

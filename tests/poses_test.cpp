@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "camera_poses.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -277,21 +278,23 @@ TEST_F(PosesTest, FramesLeftOutHaveRowsLeftOut) {
   std::string rows;
   for (int i = 0; i < 7; ++i) rows += fmt::format("1 0 0 {} 0 1 0 0 0 0 1 0\n", i);
   const std::string file = write("kitti.txt", rows);
-  using Times = std::vector<std::optional<double>>;
-  const auto positions_m = read_positions(file, Times(3), 3);
+  const auto frames = [](std::size_t count, int every = 3) {
+    return FramesRead{.every = every, .times_s = FrameTimes(count)};
+  };
+  const Positions positions_m = read_positions(file, frames(3));
   ASSERT_EQ(positions_m.size(), 3U);
   EXPECT_EQ(positions_m[2], cv::Vec3d(6, 0, 0));
-  EXPECT_EQ(read_positions(file, Times(2), 3).size(), 2U) << "the run ended early";
-  EXPECT_EQ(read_positions(file, {}, 3).size(), 7U) << "frames that are not known";
+  EXPECT_EQ(read_positions(file, frames(2)).size(), 2U) << "the run ended early";
+  EXPECT_EQ(read_positions(file, frames(0)).size(), 7U) << "frames that are not known";
   const auto expect_too_few = [&](const auto& read) {
     test::expect_error(ErrorKind::input, {file, "7 poses", "10 frames"}, read);
   };
-  expect_too_few([&] { (void)read_positions(file, Times(4), 3); });
-  expect_too_few([&] { check_poses(file, 4, 3); });
-  check_poses(file, 3, 3);
-  check_poses(file, std::nullopt, 3);
+  expect_too_few([&] { (void)read_positions(file, frames(4)); });
+  expect_too_few([&] { check_poses(file, frames(4)); });
+  check_poses(file, frames(3));
+  check_poses(file, frames(0));
   test::expect_error(ErrorKind::option, {"every is 0"},
-                     [&] { (void)read_positions(file, Times(1), 0); });
+                     [&] { (void)read_positions(file, frames(1, 0)); });
 }
 
 TEST_F(PosesTest, ReadsTumRows) {

@@ -32,7 +32,7 @@ std::vector<RetrievalOptions> some_options() {
       {.max_candidates = 1000, .min_similarity = 0.4, .shift_tolerance_columns = 1},
       {.max_candidates = 5, .shift_tolerance_columns = 32, .min_spacing = 40},
       {.max_candidates = 3, .min_similarity = 0.0, .min_spacing = 1000},
-      {.max_candidates = 7, .shift_tolerance_columns = 2, .max_count_difference = 60},
+      {.max_candidates = 7, .shift_tolerance_columns = 2, .max_center_distance_px = 3},
       {.max_candidates = 9, .shift_tolerance_columns = 8},
       {.min_similarity = 0.0, .max_center_distance_px = 0.8},
   };

@@ -9,9 +9,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "loopbit/evidence_file.hpp"
-#include "loopbit/run_folder.hpp"
-
+#include "evidence_writer.hpp"
+#include "report_json.hpp"
+#include "run_folder.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {

@@ -9,11 +9,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "loopbit/evidence_file.hpp"
 #include "loopbit/finished_run.hpp"
-#include "loopbit/run_folder.hpp"
 #include "loopbit/runner.hpp"
 
+#include "evidence_writer.hpp"
+#include "run_files.hpp"
+#include "run_folder.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -116,9 +117,7 @@ RunRecord full_record() {
   RunRecord record{.input = "images",
                    .description = "a folder",
                    .options = {},
-                   .every = 4,
-                   .views = 2,
-                   .limit = 9,
+                   .sampling = {.every = 4, .limit = 9},
                    .threads = 3,
                    .map_session = 5,
                    .map_path = "town.db",
@@ -129,7 +128,15 @@ RunRecord full_record() {
                    .truth = "truth.csv",
                    .truth_every = 2,
                    .machine = {"a processor", 7, "avx2", "Linux"},
-                   .results = run_results(four_detections(), 1.5)};
+                   .results = RunResults{.frames = 4,
+                                         .by_status = {1, 2},
+                                         .content_ms = {1, 2, 3, 4},
+                                         .retrieval_ms = {5, 6, 7, 8},
+                                         .features_ms = {9, 10, 11, 12},
+                                         .verification_ms = {13, 14, 15, 16},
+                                         .total_ms = {17, 18, 19, 20},
+                                         .frames_per_s = 2.5,
+                                         .peak_memory_mib = 99}};
   record.options.surf.max_keypoints = 77;
   record.options.surf.upright = false;
   const GroundTruth truth{.same_place = {{1, 0, 0}, {3, 0, 0}}};
@@ -143,7 +150,6 @@ TEST(RunRecord, WhatWasWrittenIsRead) {
     EXPECT_EQ(to_json(run_record_from_json(json, "run.json")), json);
   }
   const RunRecord read = run_record_from_json(to_json(full_record()), "run.json");
-  EXPECT_EQ(read.views, 2);
   EXPECT_FALSE(read.options.surf.upright);
   EXPECT_EQ(read.score->options.protocol, "of old");
   EXPECT_EQ(read.results->frames, 4);
@@ -154,8 +160,7 @@ TEST(RunRecord, ReadsAnotherVersion) {
       R"({"loopbit": "0.0.1", "options": {"of_old": {"a": 1}}, "input": {"every": 3}, "x": []})",
       "run.json");
   EXPECT_EQ(read.version, "0.0.1");
-  EXPECT_EQ(read.every, 3);
-  EXPECT_EQ(read.views, 1);
+  EXPECT_EQ(read.sampling.every, 3);
   EXPECT_FALSE(read.score || read.results);
 }
 

@@ -30,7 +30,7 @@ TEST_F(ScoringTest, FilesComeBeforeWhatIsKnown) {
   ScoringRequest by_file = request();
   by_file.not_false = write("near.csv", "11,5\n");
   by_file.ignore = write("ignore.csv", "13\n");
-  const Scoring scoring = by_file.resolve({.every = 4, .views = 2}, known);
+  const Scoring scoring = by_file.resolve({.every = 2}, known);
   EXPECT_EQ(scoring.truth->same_place, (std::vector<PlaceRun>{{10, 2, 2}, {12, 4, 4}}));
   EXPECT_EQ(scoring.truth->near_place, (std::vector<PlaceRun>{{11, 5, 5}}));
   EXPECT_EQ(scoring.truth->ignored, (std::vector<int>{13}));
@@ -62,7 +62,7 @@ TEST_F(ScoringTest, ErrorsCallAFieldWhatTheCallerCallsIt) {
     ScoringRequest changed = request();
     change(changed);
     test::expect_error(ErrorKind::option, words, [&] { (void)changed.resolve({}); });
-    test::expect_error(ErrorKind::option, words, [&] { changed.check(1, std::nullopt, false); });
+    test::expect_error(ErrorKind::option, words, [&] { changed.check({}); });
   };
   refuses([](auto& r) { r.tolerance_frames = -1; }, {"--tolerance is -1"});
   refuses([](auto& r) { r.protocol = "nobody"; }, {"no protocol 'nobody'"});

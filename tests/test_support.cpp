@@ -184,6 +184,7 @@ void ScratchTest::SetUp() {
 void ScratchTest::TearDown() { fs::remove_all(root_); }
 
 std::string ScratchTest::write(const std::string& name, std::string_view text) const {
+  fs::create_directories((root_ / name).parent_path());
   std::ofstream(root_ / name, std::ios::binary) << text;
   return path(name);
 }

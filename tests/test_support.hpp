@@ -92,9 +92,12 @@ class ScratchTest : public testing::Test {
   void SetUp() override;
   void TearDown() override;
 
-  [[nodiscard]] std::string path(const std::string& name) const { return (root_ / name).string(); }
-  /// Writes a file; returns its path.
-  [[nodiscard]] std::string write(const std::string& name, std::string_view text) const;
+  /// Of a file, or of the folder itself.
+  [[nodiscard]] std::string path(const std::string& name = "") const {
+    return (name.empty() ? root_ : root_ / name).string();
+  }
+  /// Writes a file, and the folders it lies in; returns its path.
+  std::string write(const std::string& name, std::string_view text) const;
 
  private:
   std::filesystem::path root_;

@@ -17,13 +17,13 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sys/stat.h>
 
+#include "camera_poses.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
 namespace {
 
 using Runs = std::vector<PlaceRun>;
-using Times = std::vector<std::optional<double>>;
 
 constexpr std::size_t kSide = 13;
 
@@ -142,6 +142,11 @@ class MatWriter {
 std::string bytes_of(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// So many frames without times.
+FramesRead untimed(std::size_t count, int every = 1, bool all = false) {
+  return {every, FrameTimes(count), all};
 }
 
 class TruthFileTest : public test::ScratchTest {
@@ -444,10 +449,10 @@ TEST_F(TruthFileTest, ReadsPoses) {
   options.poses.min_gap_frames = 1;
   const Runs expected{{2, 0, 0}};
   EXPECT_EQ(read_truth(file, options).same_place, expected);
-  EXPECT_EQ(read_truth(file, options, Times(3)).same_place, expected);
-  EXPECT_EQ(read_truth(file, options, Times(2)).same_place, expected) << "the run ended early";
+  EXPECT_EQ(read_truth(file, options, untimed(3)).same_place, expected);
+  EXPECT_EQ(read_truth(file, options, untimed(2)).same_place, expected) << "the run ended early";
   test::expect_error(ErrorKind::input, {"3 poses", "4 frames"},
-                     [&] { read_truth(file, options, Times(4)); });
+                     [&] { read_truth(file, options, untimed(4)); });
 }
 
 TEST_F(TruthFileTest, ReadsTrajectories) {
@@ -458,8 +463,8 @@ TEST_F(TruthFileTest, ReadsTrajectories) {
   const std::string file = write("trajectory.txt", text);
   TruthOptions options;
   options.poses.min_gap_frames = 1;
-  const Times times_s{100.0, 100.2, 101.0, 102.2, 103.01, 200.0};
-  const GroundTruth truth = read_truth(file, options, times_s);
+  const FramesRead frames{.times_s = {100.0, 100.2, 101.0, 102.2, 103.01, 200.0}};
+  const GroundTruth truth = read_truth(file, options, frames);
   EXPECT_EQ(truth.same_place, (Runs{{3, 1, 1}, {4, 2, 2}}));
   EXPECT_EQ(truth.unknown, (std::vector<int>{5}));
   expect_input_error(file, {"by time", "sequence"}, options);
@@ -472,15 +477,14 @@ TEST_F(TruthFileTest, ATrajectoryOfFramesWithoutTimesHasARowAFrame) {
   TruthOptions options;
   options.poses.min_gap_frames = 1;
   const Runs expected{{3, 0, 0}, {4, 1, 1}, {5, 2, 2}};
-  EXPECT_EQ(read_truth(file, options, Times(6)).same_place, expected);
+  EXPECT_EQ(read_truth(file, options, untimed(6)).same_place, expected);
   for (const std::size_t frames : {3U, 5U, 7U}) {
     const std::string named = fmt::format("{} frames", frames);
     test::expect_error(ErrorKind::input, {file, "6 poses", named.c_str(), "have no times"},
-                       [&] { read_truth(file, options, Times(frames)); });
+                       [&] { read_truth(file, options, untimed(frames)); });
   }
-  options.every = 4;
   options.poses.min_gap_frames = 2;
-  EXPECT_EQ(read_truth(file, options, Times(2)).same_place, expected) << "frames 0 and 4";
+  EXPECT_EQ(read_truth(file, options, untimed(2, 4)).same_place, expected) << "frames 0 and 4";
 }
 
 TEST_F(TruthFileTest, ReadsStatesOfEuroc) {
@@ -498,34 +502,34 @@ TEST_F(TruthFileTest, ReadsStatesOfEuroc) {
   EXPECT_NEAR(cv::norm(poses[3].ahead - cv::Vec3d(1, 0, 0)), 0, 1e-9) << "z turns to x";
   TruthOptions options;
   options.poses.min_gap_frames = 1;
-  const Times times_s{1403636601.01, 1403636602.0, 1403636611.0};
-  EXPECT_EQ(read_truth(file, options, times_s).same_place, (Runs{{2, 0, 0}}));
+  const FramesRead frames{.times_s = {1403636601.01, 1403636602.0, 1403636611.0}};
+  EXPECT_EQ(read_truth(file, options, frames).same_place, (Runs{{2, 0, 0}}));
   expect_input_error(write("data.csv", text + "1,2,3\n"), {"line 22", "EuRoC"});
 }
 
 TEST_F(TruthFileTest, TruthKeepsTheNumbersOfTheWholeSequence) {
-  TruthOptions options;
-  options.every = 3;
-  const GroundTruth listed = read_truth(write("truth.csv", "9,1,2\n"), options, Times(4));
+  const GroundTruth listed = read_truth(write("truth.csv", "9,1,2\n"), {}, untimed(4, 3));
   EXPECT_EQ(listed.same_place, (Runs{{9, 1, 2}}));
   EXPECT_EQ(listed.every, 3);
 
+  TruthOptions options;
   options.poses.min_gap_frames = 4;
   const std::string row = "1 0 0 0 0 1 0 0 0 0 1 0\n";
   const std::string kitti = write("poses.txt", row + row + row + row + row + row + row);
-  EXPECT_EQ(read_truth(kitti, options, Times(3)).same_place, (Runs{{5, 0, 0}, {6, 0, 1}}));
+  EXPECT_EQ(read_truth(kitti, options, untimed(3, 3)).same_place, (Runs{{5, 0, 0}, {6, 0, 1}}));
   test::expect_error(ErrorKind::input, {"7 poses", "10 frames"},
-                     [&] { read_truth(kitti, options, Times(4)); });
+                     [&] { read_truth(kitti, options, untimed(4, 3)); });
 
   std::string text;
   for (int i = 0; i < 10; ++i) text += fmt::format("{} 0 0 0 0 0 0 1\n", 100 + i);
   const std::string timed = write("trajectory.txt", text);
-  const GroundTruth by_time = read_truth(timed, options, {100.0, 103.0, 50.0, 109.0});
+  const GroundTruth by_time =
+      read_truth(timed, options, {.every = 3, .times_s = {100.0, 103.0, 50.0, 109.0}});
   EXPECT_EQ(by_time.same_place, (Runs{{9, 0, 3}})) << "frames more than 4 apart, 0 and 3";
   EXPECT_EQ(by_time.unknown, (std::vector<int>{6}));
   EXPECT_EQ(by_time.every, 3);
-  options.every = 0;
-  test::expect_error(ErrorKind::option, {"every is 0"}, [&] { read_truth(timed, options); });
+  test::expect_error(ErrorKind::option, {"every is 0"},
+                     [&] { read_truth(timed, options, {.every = 0}); });
 }
 
 TEST_F(TruthFileTest, OfTwoViewsInTurnTheFirstMayBeReadAlone) {
@@ -536,25 +540,20 @@ TEST_F(TruthFileTest, OfTwoViewsInTurnTheFirstMayBeReadAlone) {
   TruthOptions options;
   options.views = 2;
   for (const int every : {1, 2}) {
-    options.every = every;
-    const GroundTruth truth = read_truth(file, options, Times(4));
+    const GroundTruth truth = read_truth(file, options, untimed(4, every));
     EXPECT_EQ(truth.same_place, (Runs{{3, 0, 0}}));
     EXPECT_EQ(truth.every, 1);
   }
-  options.every = 1;
   for (const std::size_t images : {5U, 8U}) {
     test::expect_error(ErrorKind::input, {file, "4 frames of 2 rows", "read every 2-th"},
-                       [&] { read_truth(file, options, Times(images)); });
+                       [&] { read_truth(file, options, untimed(images)); });
   }
   test::expect_error(ErrorKind::input, {file, "4 frames", "has 9 frames"},
-                     [&] { read_truth(file, options, Times(9)); });
-  options.every = 3;
+                     [&] { read_truth(file, options, untimed(9)); });
   test::expect_error(ErrorKind::option, {"Every 3-th", "2 images"},
-                     [&] { read_truth(file, options, Times(2)); });
-  options = {};
-  options.every = 3;
+                     [&] { read_truth(file, options, untimed(2, 3)); });
   test::expect_error(ErrorKind::input, {file, "8 frames", "has 10 frames"},
-                     [&] { read_truth(file, options, Times(4)); });
+                     [&] { read_truth(file, {}, untimed(4, 3)); });
 }
 
 TEST_F(TruthFileTest, KindsAreTold) {
@@ -595,36 +594,32 @@ TEST_F(TruthFileTest, TruthOfFramesThatTheSequenceDoesNotHaveIsRefused) {
   const std::string row = "1 0 0 0 0 1 0 0 0 0 1 0\n";
   const std::string poses = write("poses.txt", row + row + row + row);
   const std::string list = write("truth.csv", "3,0,1\n");
-  const auto expect_too_many = [&](const std::string& file, std::size_t frames,
+  const auto expect_too_many = [&](const std::string& file, std::size_t frames, int every,
                                    std::initializer_list<std::string_view> parts) {
-    (void)read_truth(file, options, Times(frames));  // the run ended early
-    TruthOptions whole = options;
-    whole.all_read = true;
-    test::expect_error(ErrorKind::input, {file, "this sequence"},
-                       [&] { read_truth(file, whole, Times(frames)); });
-    test::expect_error(ErrorKind::input, parts, [&] { read_truth(file, whole, Times(frames)); });
+    (void)read_truth(file, options, untimed(frames, every));  // the run ended early
+    const auto read = [&] { read_truth(file, options, untimed(frames, every, true)); };
+    test::expect_error(ErrorKind::input, {file, "this sequence"}, read);
+    test::expect_error(ErrorKind::input, parts, read);
   };
-  expect_too_many(poses, 3, {"4 poses", "3 frames"});
-  expect_too_many(list, 3, {"frame 3", "3 frames"});
-  expect_too_many(mat({}), 4, {"13 frames", "4 frames"});
+  expect_too_many(poses, 3, 1, {"4 poses", "3 frames"});
+  expect_too_many(list, 3, 1, {"frame 3", "3 frames"});
+  expect_too_many(mat({}), 4, 1, {"13 frames", "4 frames"});
   test::expect_error(ErrorKind::input, {poses, "4 poses", "3 frames"},
-                     [&] { check_poses(poses, 3, 1, true); });
-  options.every = 2;
-  expect_too_many(poses, 1, {"4 poses", "2 frames"});
-  options.all_read = true;
-  EXPECT_EQ(read_truth(poses, options, Times(2)).frames, 4);
-  EXPECT_EQ(read_truth(list, options, Times(2)).same_place.size(), 1U);
-  options.every = 3;
-  EXPECT_EQ(read_truth(poses, options, Times(2)).frames, 4) << "frames 0 and 3, and up to 5";
-  (void)read_truth(list, options);  // frames that are not known
+                     [&] { check_poses(poses, untimed(3, 1, true)); });
+  EXPECT_EQ(read_positions(poses, untimed(3, 1, true)).size(), 3U);
+  expect_too_many(poses, 1, 2, {"4 poses", "2 frames"});
+  EXPECT_EQ(read_truth(poses, options, untimed(2, 2, true)).frames, 4);
+  EXPECT_EQ(read_truth(list, options, untimed(2, 2, true)).same_place.size(), 1U);
+  EXPECT_EQ(read_truth(poses, options, untimed(2, 3, true)).frames, 4) << "0 and 3, and up to 5";
+  (void)read_truth(list, options, untimed(0, 3, true));  // frames that are not known
 }
 
 TEST_F(TruthFileTest, ErrorsAboutPosesNameTheirFile) {
   const std::string timed = write("trajectory.txt", "100 0 0 0 0 0 0 1\n");
   test::expect_error(ErrorKind::input, {timed, "no frame is within"},
-                     [&] { read_truth(timed, {}, {0.5}); });
+                     [&] { read_truth(timed, {}, {.times_s = {0.5}}); });
   test::expect_error(ErrorKind::input, {timed, "no frame is within"},
-                     [&] { (void)read_positions(timed, {0.5}); });
+                     [&] { (void)read_positions(timed, {.times_s = {0.5}}); });
   const std::string far = write("poses.txt", "1 0 0 2e9 0 1 0 0 0 0 1 0\n");
   test::expect_error(ErrorKind::input, {far, "frame 0"}, [&] { read_truth(far); });
 }
@@ -646,10 +641,10 @@ TEST_F(TruthFileTest, OnlyRegularFilesOfTextAreRead) {
 
 TEST_F(TruthFileTest, TooFewRowsForTheSequenceAreNoticed) {
   const std::string file = mat({});
-  EXPECT_EQ(read_truth(file, {}, Times(kSide)).same_place, kExpected);
-  EXPECT_EQ(read_truth(file, {}, Times(4)).same_place, kExpected);
+  EXPECT_EQ(read_truth(file, {}, untimed(kSide)).same_place, kExpected);
+  EXPECT_EQ(read_truth(file, {}, untimed(4)).same_place, kExpected);
   test::expect_error(ErrorKind::input, {file, "13 frames", "14"},
-                     [&] { read_truth(file, {}, Times(kSide + 1)); });
+                     [&] { read_truth(file, {}, untimed(kSide + 1)); });
 }
 
 struct RealMatrix {

@@ -98,17 +98,6 @@ def run(
     return _loopbit._run(source, detector, on_detection, on_bad_frame)
 
 
-def _check_from_start(source: ImageSource, **files: object) -> None:
-    """Raises OptionError for a file that counts from the first frame if that was already read."""
-    taken = _loopbit._frames_taken(source)
-    for name, file in files.items():
-        if taken and isinstance(file, (str, os.PathLike)):
-            raise _loopbit.OptionError(
-                f"{name} is '{os.fspath(file)!s}', which counts from the first frame, but {taken} "
-                "frames of the source were already read; open it again."
-            )
-
-
 def run_folder(
     source: ImageSource | Path,
     out: Path | None = None,
@@ -153,68 +142,24 @@ def run_folder(
     """
     if not isinstance(source, ImageSource):
         source = _loopbit.open_source(source)
-    every, frames = source.every, _loopbit._frames_left(source)
-    _check_from_start(source, truth=truth, not_false=not_false, ignore=ignore,
-                      positions_m=positions_m)
-    if keep_images and not map:
-        raise _loopbit.OptionError("keep_images stores images in a map; give map, or leave it out.")
-    if not callable(on_bad_frame):
-        raise TypeError(f"on_bad_frame is {on_bad_frame!r}, but must be callable.")
     scoring, known = request(truth, protocol=protocol, tolerance_frames=tolerance_frames,
                              poses=poses, variable=variable, views=views, not_false=not_false,
                              ignore=ignore)
-    scoring.check(every, frames, frames is not None and _loopbit._limit(source) == 0)
-    if positions_m is None:
-        positions_m = scoring.poses_file() or None
-    if isinstance(positions_m, (str, os.PathLike)):
-        _loopbit._check_poses(positions_m, frames, every, False)
-    elif positions_m is not None:
-        positions_m = numpy.asarray(positions_m, dtype=float)
-        _check_positions(positions_m, frames)
-    recorded = _loopbit._RecordedRun(
-        source,
-        out or "",
-        LoopDetectorOptions() if options is None else options,
-        map or "",
-        overwrite,
-        keep_images,
-        map_cache_mb,
-        scoring,
-        positions_m if isinstance(positions_m, (str, os.PathLike)) else "",
-    )
-    stopped_by = "end"
-    try:
-        recorded.detect(source, on_bad_frame, bool(evidence))
-    except BaseException as error:
-        stopped_by = "interrupt" if isinstance(error, KeyboardInterrupt) else _plain(str(error))
-        raise
-    else:
-        times_s = recorded.times_s
-        try:
-            recorded.score(scoring, known, frames)
-        finally:
-            if isinstance(positions_m, (str, os.PathLike)):
-                positions_m = _loopbit.read_positions(positions_m, times_s, every)
-            if positions_m is not None:
-                _check_positions(positions_m, len(times_s))
-                recorded.keep_positions(positions_m)
-    finally:
-        recorded.finish(stopped_by)
-    return _loopbit.read_run(recorded.path)
-
-
-def _check_positions(positions_m: numpy.typing.NDArray[Any], frames: int | None) -> None:
-    if positions_m.ndim != 2 or positions_m.shape[1] != 3:
-        raise ValueError(f"positions_m has shape {positions_m.shape}, but must be (n, 3).")
-    if frames is not None and len(positions_m) != frames:
-        raise ValueError(f"positions_m has {len(positions_m)} rows, but there are {frames} frames.")
-    if numpy.isinf(positions_m).any():
-        raise ValueError("positions_m is infinite somewhere, but must be nan if unknown.")
-
-
-def _plain(text: str) -> str:
-    """Escapes bytes of file names that are not valid text."""
-    return text.encode(errors="backslashreplace").decode()
+    file, rows = ((positions_m, None) if isinstance(positions_m, (str, os.PathLike))
+                  else ("", positions_m))
+    return _loopbit._run_folder(source, _loopbit._RunRequest(
+        options=LoopDetectorOptions() if options is None else options,
+        folder=out or "",
+        overwrite=overwrite,
+        evidence=evidence,
+        map=map or "",
+        keep_images=keep_images,
+        map_cache_mb=map_cache_mb,
+        scoring=scoring,
+        truth=known,
+        poses=file,
+        positions_m=rows,
+    ), on_bad_frame)
 
 
 def write_report(run: FinishedRun | Path, path: Path | None = None) -> str:

@@ -28,21 +28,13 @@ namespace {
 namespace py = pybind11;
 
 using Path = std::filesystem::path;
-using Times = std::vector<std::optional<double>>;
-using Positions = std::vector<std::optional<cv::Vec3d>>;
 using Free = py::call_guard<WithoutGil>;
 
 std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit,
                                           int max_megapixels) {
-  if (every < 1 || limit < 0) {
-    throw Error(ErrorKind::option,
-                fmt::format("every is {} and limit is {}, but every must be at least 1, and limit "
-                            "0 (no limit) or more.",
-                            every, limit));
-  }
-  auto source = subsample(open_source(input.string(), max_megapixels),
-                          static_cast<std::size_t>(every), static_cast<std::size_t>(limit));
-  return std::make_unique<SharedSource>(std::move(source), input.string(), every, limit);
+  const Sampling sampling{every, limit};
+  return std::make_unique<SharedSource>(
+      subsample(open_source(input.string(), max_megapixels), sampling), input.string(), sampling);
 }
 
 Frame next_frame(SharedSource& source) {
@@ -91,7 +83,9 @@ void bind_source(py::module_& module) {
           "early_end", [](const SharedSource& self) { return Text{early_end_of(self)}; },
           "After the last frame: why the input ended early, such as a video that is cut off. Empty "
           "if it did not.")
-      .def_property_readonly("every", &SharedSource::every, "Only every N-th frame is read.")
+      .def_property_readonly(
+          "every", [](const SharedSource& self) { return self.sampling().every; },
+          "Only every N-th frame is read.")
       .def("__repr__", [](const SharedSource& self) {
         return Text{fmt::format("ImageSource('{}')", self.description())};
       });
@@ -102,9 +96,6 @@ void bind_source(py::module_& module) {
       "folder, a text file that lists images, an image, a video, or 'camera:N'. Reads only "
       "every N-th frame, and at most limit frames (0 = all). Images above max_megapixels are "
       "unreadable.");
-  module.def("_frames_taken", &SharedSource::frames_taken, py::arg("source"), Free());
-  module.def("_frames_left", &SharedSource::frames_left, py::arg("source"), Free());
-  module.def("_limit", &SharedSource::limit, py::arg("source"));
 }
 
 std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {
@@ -181,30 +172,22 @@ void bind_truth(py::module_& module) {
       .value("poses", TruthKind::poses, "camera poses");
 }
 
-/// To be called with the GIL, which is free meanwhile.
-Positions read_without_gil(const std::string& path, const Times& times_s, int every) {
-  const WithoutGil release;
-  return read_positions(path, times_s, every);
-}
-
 void bind_poses(py::module_& module) {
   bind_settings<PoseTruthOptions>(module, "PoseTruthOptions", "truth",
                                   "When two frames with known poses show the same place.");
   module.def(
       "read_positions",
-      [](const Path& path, const Times& times_s, int every) {
-        return to_array(read_without_gil(path.string(), times_s, every));
+      [](const Path& path, FrameTimes times_s, int every) {
+        const auto read = [&] {
+          const WithoutGil release;
+          return read_positions(path.string(), {.every = every, .times_s = std::move(times_s)});
+        };
+        return to_array(read());
       },
       py::arg("path"), py::arg("times_s"), whole("every") = 1,
       "Camera centres from KITTI poses, a TUM trajectory or EuRoC states: shape (n, 3), one row "
       "per entry of times_s, nan if unknown. times_s has the times of the frames read, or None for "
       "a frame without a time. every means that only every N-th frame of the sequence was read.");
-  module.def(
-      "_check_poses",
-      [](const Path& path, std::optional<std::size_t> frames, int every, bool all_read) {
-        check_poses(path.string(), frames, every, all_read);
-      },
-      py::arg("path"), whole("frames"), whole("every"), py::arg("all_read"), Free());
 }
 
 }  // namespace

@@ -196,16 +196,13 @@ void bind_scoring(py::module_& module) {
            py::kw_only(), py::arg("truth") = "", py::arg("not_false") = "", py::arg("ignore") = "",
            py::arg("protocol") = "", whole("tolerance_frames") = py::none(),
            py::arg("poses") = py::none(), whole("views") = py::none(), py::arg("variable") = "")
-      .def("check", &ScoringRequest::check, whole("every"), whole("frames"), py::arg("all_read"),
-           Released())
       .def(
           "read_truth",
           [](const ScoringRequest& self, int every, FrameTimes times_s, bool all_read) {
             check_every(every);
-            return self.resolve({every, 1, std::move(times_s), all_read}).truth;
+            return self.resolve({every, std::move(times_s), all_read}).truth;
           },
-          whole("every"), py::arg("times_s"), py::arg("all_read"), Released())
-      .def("poses_file", &ScoringRequest::poses_file, Released());
+          whole("every"), py::arg("times_s"), py::arg("all_read"), Released());
 }
 
 }  // namespace

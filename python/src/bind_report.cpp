@@ -22,7 +22,7 @@ void write_run_report(const FinishedRun& run, const std::filesystem::path& name,
   column.run = run;
   column.positions_m = run.positions_m;
   column.truth = run.truth;
-  column.evaluation = recorded_scoring(run).evaluation;
+  column.evaluation = run.scoring().evaluation;
   write_report(path.string(), {column});
 }
 

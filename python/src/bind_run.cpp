@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include <atomic>
 #include <cmath>
+#include <exception>
 #include <map>
-#include <memory>
+#include <stdexcept>
 #include <utility>
 
 #include <pybind11/numpy.h>
@@ -13,7 +14,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/evidence_file.hpp"
 #include "loopbit/finished_run.hpp"
-#include "loopbit/recorded_run.hpp"
+#include "loopbit/record_run.hpp"
 #include "loopbit/runner.hpp"
 
 #include "bind_data.hpp"
@@ -98,91 +99,103 @@ std::vector<Detection> run_source(SharedSource& source, SharedDetector& detector
   return detections;
 }
 
-RunRecord record_of(const SharedSource& source, const LoopDetectorOptions& options,
-                    const std::string& map, const std::string& truth) {
-  return {.input = source.input(),
-          .description = source.description(),
-          .options = options,
-          .every = source.every(),
-          .limit = source.limit(),
-          .map_path = map,
-          .truth = truth};
-}
-
-std::unique_ptr<RecordedRun> record_run(SharedSource& source, const Path& out,
-                                        const LoopDetectorOptions& options, const Path& map,
-                                        bool overwrite, bool keep_images,
-                                        std::optional<std::size_t> map_cache_mb,
-                                        const ScoringRequest& scoring, const Path& poses) {
-  if (overwrite || options.exclusion.seconds > 0) source.prove(options);
-  return std::make_unique<RecordedRun>(
-      record_of(source, options, map.string(), scoring.truth),
-      RunOutput{.folder = out.string(),
-                .overwrite = overwrite,
-                .keep_images = keep_images,
-                .map_cache_mb = map_cache_mb.value_or(kMapCache_mb),
-                .inputs = {source.input(), scoring.truth, scoring.not_false, scoring.ignore,
-                           poses.string()}});
-}
-
-/// Scores by the request, or by `known` truth. `frames`: see SharedSource::frames_left().
-void score(RecordedRun& recorded, const ScoringRequest& request,
-           const std::optional<GroundTruth>& known, std::optional<std::size_t> frames) {
-  const RunRecord& record = recorded.record();
-  FrameTimes times_s = match_list(recorded.folder().detections()).times_s;
-  const bool all = record.limit == 0 && frames == times_s.size();
-  const auto [truth, evaluation] =
-      request.resolve({record.every, record.views, std::move(times_s), all}, {known, {}});
-  if (truth) recorded.score(*truth, evaluation);
-}
-
 Evaluation evaluate_found(const MatchList& matches, const FinishedRun* run,
                           const std::optional<GroundTruth>& known, const ScoringRequest& request) {
-  const FramesRead frames = run ? frames_read(*run) : FramesRead{.times_s = matches.times_s};
+  const FramesRead frames = run ? run->frames() : FramesRead{.times_s = matches.times_s};
   const bool is_recorded = run && !known;
   const auto [truth, evaluation] =
-      request.resolve(frames, is_recorded ? recorded_scoring(*run) : Scoring{known, {}});
+      request.resolve(frames, is_recorded ? run->scoring() : Scoring{known, {}});
   if (truth) return evaluate(matches, *truth, evaluation);
   throw Error(ErrorKind::option, "There is no ground truth; give truth.");
 }
 
-void detect(RecordedRun& recorded, SharedSource& source, const OnBadFrame& on_bad_frame,
-            bool keep_evidence) {
+Positions to_positions(const PositionRows& rows_m) {
+  if (rows_m.ndim() != 2 || rows_m.shape(1) != 3) {
+    throw py::value_error(fmt::format("positions_m has shape {}, but must be (n, 3).",
+                                      literal(rows_m.attr("shape"))));
+  }
+  Positions positions_m(static_cast<std::size_t>(rows_m.shape(0)));
+  for (py::ssize_t row = 0; row < rows_m.shape(0); ++row) {
+    const cv::Vec3d position(rows_m.at(row, 0), rows_m.at(row, 1), rows_m.at(row, 2));
+    const double length = cv::norm(position);
+    if (std::isinf(length)) {
+      throw py::value_error("positions_m is infinite somewhere, but must be nan if unknown.");
+    }
+    if (!std::isnan(length)) positions_m[static_cast<std::size_t>(row)] = position;
+  }
+  return positions_m;
+}
+
+/// A Python exception of a callback, which ends a run. what() is for run.json.
+struct RaisedInCallback : std::runtime_error {
+  RaisedInCallback(const std::string& text, std::exception_ptr raised)
+      : std::runtime_error(text), exception(std::move(raised)) {}
+  std::exception_ptr exception;
+};
+
+/// "interrupt" for Ctrl-C; bytes of file names that are not valid text are escaped.
+std::string reason_of(const py::error_already_set& raised) {
+  if (raised.matches(PyExc_KeyboardInterrupt)) return "interrupt";
+  return py::bytes(py::str(raised.value()).attr("encode")("utf-8", "backslashreplace"));
+}
+
+template <typename Call>
+void call_python(const Call& call) {
+  try {
+    call();
+  } catch (const py::error_already_set& raised) {
+    const WithGil acquire;
+    throw RaisedInCallback(reason_of(raised), std::current_exception());
+  }
+}
+
+/// For run_folder() of the package, which has keywords of the same names.
+FinishedRun run_folder(SharedSource& source, const RunRequest& request,
+                       const OnBadFrame& on_bad_frame) {
   const RunListener listener{
-      .on_detection = [](const Detection& /*detection*/) { check_signals(); },
-      .on_bad_frame = [&](const std::string& sentence) { tell(on_bad_frame, Text{sentence}); }};
+      .on_detection = [](const Detection& /*detection*/) { call_python([] { check_signals(); }); },
+      .on_bad_frame =
+          [&](const std::string& sentence) {
+            call_python([&] { tell(on_bad_frame, Text{sentence}); });
+          }};
   const std::atomic<bool> never{false};
   const WithoutGil release;
-  recorded.detect(source, listener, keep_evidence, never);
-  tell_early_end(source, on_bad_frame);
-}
-
-void keep_positions(RecordedRun& recorded, const PositionRows& positions_m) {
-  std::vector<std::optional<cv::Vec3d>> rows(static_cast<std::size_t>(positions_m.shape(0)));
-  for (py::ssize_t row = 0; row < positions_m.shape(0); ++row) {
-    const cv::Vec3d position(positions_m.at(row, 0), positions_m.at(row, 1),
-                             positions_m.at(row, 2));
-    if (!std::isnan(cv::norm(position))) rows[static_cast<std::size_t>(row)] = position;
+  try {
+    const RunOutcome outcome = record_run(source, request, listener, never);
+    tell_early_end(source, on_bad_frame);
+    if (outcome.fault) throw Error(*outcome.fault);
+    return read_run(outcome.folder);
+  } catch (const RaisedInCallback& raised) {
+    std::rethrow_exception(raised.exception);
   }
-  const WithoutGil release;
-  recorded.keep_positions(rows);
 }
 
-/// For run_folder() of the package, which uses RecordedRun like the command.
-void bind_recorded_run(py::module_& module) {
-  py::class_<RecordedRun>(module, "_RecordedRun")
-      .def(py::init(&record_run), py::arg("source"), py::arg("out"), py::arg("options"),
-           py::arg("map"), py::arg("overwrite"), py::arg("keep_images"), whole("map_cache_mb"),
-           py::arg("scoring"), py::arg("poses"), Free())
-      .def("detect", &detect, py::arg("source"), py::arg("on_bad_frame"), py::arg("evidence"))
-      .def_property_readonly("path",
-                             [](const RecordedRun& self) { return Text{self.folder().path()}; })
-      .def_property_readonly(
-          "times_s",
-          [](const RecordedRun& self) { return match_list(self.folder().detections()).times_s; })
-      .def("score", &score, py::arg("scoring"), py::arg("known"), whole("frames"), Free())
-      .def("keep_positions", &keep_positions, py::arg("positions_m"))
-      .def("finish", &RecordedRun::finish, py::arg("stopped_by"), Free());
+RunRequest request_of(const LoopDetectorOptions& options, const Path& folder, bool overwrite,
+                      bool evidence, const Path& map, bool keep_images,
+                      std::optional<std::size_t> map_cache_mb, const ScoringRequest& scoring,
+                      const std::optional<GroundTruth>& truth, const Path& poses,
+                      const std::optional<PositionRows>& positions_m) {
+  return {.options = options,
+          .folder = folder.string(),
+          .overwrite = overwrite,
+          .evidence = evidence,
+          .map = map.string(),
+          .keep_images = keep_images,
+          .map_cache_mb = map_cache_mb.value_or(kMapCache_mb),
+          .scoring = scoring,
+          .truth = truth,
+          .poses = poses.string(),
+          .positions_m = positions_m ? std::optional(to_positions(*positions_m)) : std::nullopt};
+}
+
+void bind_run_folder(py::module_& module) {
+  py::class_<RunRequest>(module, "_RunRequest")
+      .def(py::init(&request_of), py::kw_only(), py::arg("options"), py::arg("folder"),
+           py::arg("overwrite"), py::arg("evidence"), py::arg("map"), py::arg("keep_images"),
+           whole("map_cache_mb"), py::arg("scoring"), py::arg("truth"), py::arg("poses"),
+           py::arg("positions_m"));
+  module.def("_run_folder", &run_folder, py::arg("source"), py::arg("request"),
+             py::arg("on_bad_frame"));
 }
 
 std::map<PlaceId, BinaryContent> contents_of(const FinishedRun& run) {
@@ -225,7 +238,7 @@ void bind_run(py::module_& module) {
              "Converts detections to a MatchList.");
   module.def("_run", &run_source, py::arg("source"), py::arg("detector"), py::arg("on_detection"),
              py::arg("on_bad_frame"));
-  bind_recorded_run(module);
+  bind_run_folder(module);
   module.def("_evaluate", &evaluate_found, py::arg("matches"), py::arg("run"), py::arg("known"),
              py::arg("scoring"), Free());
 }

@@ -39,8 +39,8 @@ template <typename Struct, typename Value>
 void set_setting(Struct& options, const Field<Struct, Value>& field, const std::string& section,
                  const pybind11::handle& value) {
   const Value cast = cast_value<Value>(value, section + '.' + std::string(field.name));
-  check_range(section, field.name, static_cast<double>(cast), static_cast<double>(field.min),
-              static_cast<double>(field.max));
+  detail::check_range(section, field.name, static_cast<double>(cast),
+                      static_cast<double>(field.min), static_cast<double>(field.max));
   options.*field.member = cast;
 }
 

@@ -9,7 +9,7 @@
 
 #include "loopbit/error.hpp"
 
-namespace loopbit {
+namespace loopbit::detail {
 namespace {
 
 template <typename Number>
@@ -49,4 +49,4 @@ void parse_value(const std::string& text, const std::string& name, bool& value) 
   value = text == "true";
 }
 
-}  // namespace loopbit
+}  // namespace loopbit::detail

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <iterator>
 
 #include <fmt/format.h>
 
@@ -49,7 +48,7 @@ std::string escaped(std::string_view text, const Escape& escape) {
 std::string printable(std::string_view text) {
   return escaped(text, [](std::string& shown, std::string_view control) {
     for (const char c : control) {
-      fmt::format_to(std::back_inserter(shown), "\\x{:02x}", static_cast<unsigned char>(c));
+      shown += fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
     }
   });
 }
@@ -60,7 +59,7 @@ std::string printable_json(std::string_view json) {
     if (code < 0x20) {
       shown += control;  // between values: JSON itself escapes these within them
     } else {
-      fmt::format_to(std::back_inserter(shown), "\\u{:04x}", code);
+      shown += fmt::format("\\u{:04x}", code);
     }
   });
 }

@@ -3,11 +3,12 @@
 #include "loopbit/write_file.hpp"
 
 #include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
 
-#include "loopbit/error.hpp"
+#include <fmt/format.h>
 
 namespace loopbit {
 
@@ -54,6 +55,13 @@ std::string resolved_path(const std::string& path) {
   }
   file = fs::weakly_canonical(file, error);
   return error ? path : file.string();
+}
+
+Error cannot_write(const std::string& path, int errno_value, const std::string& kept) {
+  return {ErrorKind::output,
+          fmt::format("Cannot write '{}': {}; check the folder, its permissions and the free "
+                      "space.{}",
+                      path, std::strerror(errno_value), kept)};
 }
 
 }  // namespace loopbit

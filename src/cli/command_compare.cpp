@@ -11,7 +11,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/evaluation.hpp"
 #include "loopbit/printable.hpp"
-#include "loopbit/run_folder.hpp"
+#include "loopbit/run_record.hpp"
 
 #include "commands.hpp"
 #include "process.hpp"
@@ -75,10 +75,7 @@ FramesRead share_frames(std::vector<ListedRun>& runs) {
     }
   }
   FramesRead frames = known->frames;
-  for (ListedRun& run : runs) {
-    run.run.list.times_s = frames.times_s;
-    frames.views = std::max(frames.views, run.frames.views);  // the images are the same
-  }
+  for (ListedRun& run : runs) run.run.list.times_s = frames.times_s;
   return frames;
 }
 

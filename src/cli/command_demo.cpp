@@ -12,6 +12,7 @@
 #include "commands.hpp"
 #include "progress.hpp"
 #include "session.hpp"
+#include "truth_flags.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -64,7 +65,7 @@ void write_images(const World& world, const std::string& folder) {
       folder, world.options().frames, describe(world));
 }
 
-int demo_command(const DemoFlags& flags, const Arguments& arguments) {
+int demo_command(DemoFlags& flags, const Arguments& arguments) {
   WorldOptions options = flags.world;
   for (const std::string& setting : flags.world_settings) {
     const auto [name, value] = split_setting(setting);
@@ -74,27 +75,21 @@ int demo_command(const DemoFlags& flags, const Arguments& arguments) {
                                                  name));
     }
   }
-  flags.truth.check(1, static_cast<std::size_t>(std::max(0, options.frames)), true);
+  const auto frames = static_cast<std::size_t>(std::max(0, options.frames));
+  flags.truth.scoring.check({.times_s = FrameTimes(frames), .all = true});
   const auto world = std::make_shared<const World>(options);
   if (!flags.images.empty()) {
     check_nothing_is_detected(flags);
     write_images(*world, flags.images);
     return success;
   }
-  Session session;
-  session.source = make_world_source(world);
-  session.input = "demo";
-  session.arguments = arguments;
-  session.truth_files = flags.truth.files();
-  const std::string description = flags.truth.scoring.description();
-  session.truth_description = description.empty() ? "exact (built-in world)" : description;
-  session.scoring = [&](const FrameTimes& times_s) {
-    const GroundTruth built_in{.same_place = world->same_place(),
-                               .near_place = world->near_place()};
-    return flags.truth.scoring.resolve({.times_s = times_s}, {.truth = built_in});
-  };
-  session.positions = [&](const FrameTimes& times_s) { return positions(*world, times_s.size()); };
-  return run_session(std::move(session), flags.session);
+  RunRequest& run = flags.session.run;
+  run.arguments = arguments;
+  run.scoring = flags.truth.scoring;
+  run.truth = {.same_place = world->same_place(), .near_place = world->near_place()};
+  run.truth_description = "exact (built-in world)";
+  run.positions_m = positions(*world, frames);
+  return run_session(make_world_source(world), "demo", {}, flags.session);
 }
 
 std::string list_world_settings() {
@@ -113,9 +108,9 @@ void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("demo", "Run the built-in world, whose true loops are known");
   command->footer(list_world_settings() + list_truth_settings());
-  flags->session.out = "loopbit_demo";
+  flags->session.run.folder = "loopbit_demo";
   CLI::Option* out = command
-                         ->add_option("--out", flags->session.out,
+                         ->add_option("--out", flags->session.run.folder,
                                       "Folder for loops.csv, run.json and report.html")
                          ->type_name("DIR")
                          ->capture_default_str();

@@ -33,7 +33,7 @@ void print_decision(const DecisionCounts& counts) {
   fmt::print("           {} wrong loop{}: precision {}", counts.wrong, plural(counts.wrong),
              share_text(counts.precision(), judged, 4));
   if (judged > 0) {
-    const Interval interval = wilson_interval(counts.right, judged);
+    const Interval interval = counts.precision_interval();
     fmt::print(" (95 % interval {:.4f} to {:.4f})", interval.low, interval.high);
   }
   fmt::print("\n");

@@ -34,7 +34,7 @@ void report_command(const ReportFlags& flags) {
       throw Error(ErrorKind::option,
                   fmt::format("'{}' is not a run folder; add --out FILE for the page.", flags.run));
     }
-    path = (std::filesystem::path(flags.run) / "report.html").string();
+    path = report_in(flags.run);
   }
   write_report(path, {run}, flags.report);
   std::error_code no_file;  // but a device or a pipe

@@ -10,6 +10,7 @@
 
 #include "commands.hpp"
 #include "session.hpp"
+#include "truth_flags.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -19,8 +20,7 @@ namespace fs = std::filesystem;
 struct RunFlags {
   SessionFlags session;
   std::string input;
-  int every = 1;
-  int limit = 0;
+  Sampling sampling;
   int max_megapixels = kMaxMegapixels;
   TruthFlags truth;
 };
@@ -34,36 +34,20 @@ std::string usual_folder(const RunFlags& flags) {
   std::string name = (fs::is_directory(last, error) ? last.filename() : last.stem()).string();
   std::replace(name.begin(), name.end(), ':', '_');  // of camera:0
   std::string folder = name + "_loops";
-  for (int number = 2; !flags.session.overwrite && fs::exists(folder, error); ++number) {
+  for (int number = 2; !flags.session.run.overwrite && fs::exists(folder, error); ++number) {
     folder = fmt::format("{}_loops_{}", name, number);
   }
   return folder;
 }
 
-int run_command(const RunFlags& flags, const Arguments& arguments) {
-  Session session;
-  SessionFlags output = flags.session;
-  if (output.out.empty() && output.map.empty()) output.out = usual_folder(flags);
-  session.source =
-      subsample(open_source(flags.input, flags.max_megapixels),
-                static_cast<std::size_t>(flags.every), static_cast<std::size_t>(flags.limit));
-  const std::optional<std::size_t> frames = exact_size(*session.source, flags.input);
-  const bool is_whole = frames && flags.limit == 0;
-  flags.truth.check(flags.every, frames, is_whole);
-  session.scoring = [&, frames, is_whole](const FrameTimes& times_s) {
-    const bool all = is_whole && times_s.size() == *frames;
-    return flags.truth.scoring.resolve({.every = flags.every, .times_s = times_s, .all = all});
-  };
-  session.positions = [&](const FrameTimes& times_s) {
-    return flags.truth.read_positions({.every = flags.every, .times_s = times_s});
-  };
-  session.input = flags.input;
-  session.arguments = arguments;
-  session.truth_files = flags.truth.files();
-  session.truth_description = flags.truth.scoring.description();
-  session.every = flags.every;
-  session.limit = flags.limit;
-  return run_session(std::move(session), output);
+int run_command(RunFlags& flags, const Arguments& arguments) {
+  RunRequest& run = flags.session.run;
+  if (run.folder.empty() && run.map.empty()) run.folder = usual_folder(flags);
+  run.arguments = arguments;
+  run.scoring = flags.truth.scoring;
+  run.poses = flags.truth.poses;
+  return run_session(subsample(open_source(flags.input, flags.max_megapixels), flags.sampling),
+                     flags.input, flags.sampling, flags.session);
 }
 
 }  // namespace
@@ -78,15 +62,15 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
       ->required();
   command
       ->add_option(
-          "--out", flags->session.out,
+          "--out", flags->session.run.folder,
           "Folder for loops.csv, run.json and report.html; default: INPUT_loops, with a new number "
           "if that exists; with --map: MAP_session_N")
       ->type_name("DIR");
   flags->session.add_to(*command);
-  command->add_option("--every", flags->every, "Read only every N-th frame")
+  command->add_option("--every", flags->sampling.every, "Read only every N-th frame")
       ->type_name("N")
       ->check(whole_number(1, 1'000'000));
-  command->add_option("--limit", flags->limit, "Read at most N frames; 0 = all")
+  command->add_option("--limit", flags->sampling.limit, "Read at most N frames; 0 = all")
       ->type_name("N")
       ->check(whole_number(0, 2'000'000'000));
   add_image_flag(*command, flags->max_megapixels);

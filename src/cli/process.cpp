@@ -20,6 +20,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/printable.hpp"
+#include "loopbit/write_file.hpp"
 
 namespace loopbit::cli {
 namespace {

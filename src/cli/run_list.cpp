@@ -56,8 +56,8 @@ ListedRun listed_run(const std::string& text) {
     run.list = match_list(run.run->detections);
     run.truth = run.run->truth;
     run.positions_m = run.run->positions_m;
-    run.evaluation = recorded_scoring(*run.run).evaluation;
-    listed.frames = frames_read(*run.run);
+    run.evaluation = run.run->scoring().evaluation;
+    listed.frames = run.run->frames();
   } else {
     run.list = read_match_list(path);
     listed.frames.times_s = run.list.times_s;
@@ -78,6 +78,10 @@ ReportRun report_run(const std::string& text, const TruthFlags& flags) {
   ListedRun listed = listed_run(text);
   take_truth(listed.run, flags, listed.frames);
   return std::move(listed.run);
+}
+
+std::string report_in(const std::string& folder) {
+  return (fs::path(folder) / "report.html").string();
 }
 
 ReportRun scored_run(const std::string& text, const TruthFlags& flags) {

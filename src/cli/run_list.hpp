@@ -29,6 +29,9 @@ void take_truth(ReportRun& run, const TruthFlags& flags, const FramesRead& frame
 /// listed_run with the truth and the poses of its own frames.
 ReportRun report_run(const std::string& text, const TruthFlags& flags = {});
 
+/// The page that shows the run in `folder`.
+std::string report_in(const std::string& folder);
+
 /// As report_run, but an Error (kind option) where there is no truth.
 ReportRun scored_run(const std::string& text, const TruthFlags& flags);
 

@@ -9,10 +9,7 @@
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
-#include "loopbit/error.hpp"
-#include "loopbit/finished_run.hpp"
-#include "loopbit/provable_source.hpp"
-#include "loopbit/recorded_run.hpp"
+#include "loopbit/run_input.hpp"
 
 #include "commands.hpp"
 #include "map_output.hpp"
@@ -32,60 +29,27 @@ int thread_count(int wanted) {
   return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
-void drive(ImageSource& source, RecordedRun& recorded, bool keep_evidence,
-           const std::atomic<bool>& stop) {
-  {
-    Progress progress(source.size());
-    const RunListener listener{
-        [&](const Detection& detection) { progress.advance(detection.status == Status::loop); },
-        [&](const std::string& sentence) { progress.report(sentence); }};
-    recorded.detect(source, listener, keep_evidence, stop);
-  }
-  const std::string& why = recorded.record().early_end;
-  if (!why.empty()) tell(fmt::format("loopbit: {}\n", why));
-}
-
-/// Returns what went wrong: the run itself is none the worse for it.
-std::optional<Error> score(const Session& session, RecordedRun& recorded) {
-  const FrameTimes times_s = match_list(recorded.folder().detections()).times_s;
-  std::optional<Error> fault;
-  const auto attempt = [&](const auto& step) {
-    try {
-      step();
-    } catch (const Error& error) {
-      if (!fault) fault = error;
-    }
-  };
-  attempt([&] {
-    const auto [truth, evaluation] = session.scoring(times_s);
-    if (truth) recorded.score(*truth, evaluation);
-  });
-  attempt([&] {
-    const auto positions = session.positions(times_s);
-    if (!positions.empty()) recorded.keep_positions(positions);
-  });
-  return fault;
-}
-
-void present(const RecordedRun& recorded, const SessionFlags& flags) {
-  const RunFolder& folder = recorded.folder();
-  if (!flags.no_report) {
-    write_report(folder.report_path(), {report_run(folder.path())}, flags.report);
-  }
-  print_summary(recorded.record(), folder, !flags.no_report);
+RunOutcome run_with_progress(RunInput& input, const RunRequest& request,
+                             const std::atomic<bool>& stop) {
+  Progress progress(input.size());
+  return record_run(
+      input, request,
+      {[&](const Detection& detection) { progress.advance(detection.status == Status::loop); },
+       [&](const std::string& sentence) { progress.report(sentence); }},
+      stop);
 }
 
 }  // namespace
 
 void SessionFlags::add_to(CLI::App& command) {
-  command.add_flag("--overwrite", overwrite, "Replace an earlier run in the output folder");
+  command.add_flag("--overwrite", run.overwrite, "Replace an earlier run in the output folder");
   command
-      .add_option("--map", map,
+      .add_option("--map", run.map,
                   "Continue this map, or create it. Places of earlier sessions are recognised")
       ->type_name("MAP.db");
-  command.add_flag("--keep-images", keep_images, "Store a small JPEG of each place in the map")
+  command.add_flag("--keep-images", run.keep_images, "Store a small JPEG of each place in the map")
       ->needs("--map");
-  add_map_cache_flag(command, map_cache_mb);
+  add_map_cache_flag(command, run.map_cache_mb);
   CLI::Option* named = command.add_option("--preset", preset, "Initial settings: default or paper")
                            ->type_name("NAME");
   command.add_option("--config", config, "Settings file, JSON; see 'loopbit options --json'")
@@ -100,8 +64,9 @@ void SessionFlags::add_to(CLI::App& command) {
                   "Threads, at most one per core; 0 = one per core. Results do not depend on it")
       ->type_name("N")
       ->check(whole_number(0, 1024));
-  CLI::Option* left_out =
-      command.add_flag("--no-report", no_report, "Store no pictures and write no report.html");
+  CLI::Option* left_out = command.add_flag_callback(
+      "--no-report", [this] { run.evidence = false; },
+      "Store no pictures and write no report.html");
   command.add_flag("--open", open, "Open the report in the browser")->excludes(left_out);
   add_report_flag(command, report);
 }
@@ -141,50 +106,29 @@ LoopDetectorOptions SessionFlags::detector_options() const {
   return options;
 }
 
-int run_session(Session session, const SessionFlags& flags) {
-  const std::atomic<bool>& stop_requested = stop_on_signal();
-  const int threads = thread_count(flags.threads);
-  std::vector<std::string> inputs = session.truth_files;
-  inputs.insert(inputs.end(), {session.input, flags.config});
-  const LoopDetectorOptions options = flags.detector_options();
-  if (flags.overwrite || options.exclusion.seconds > 0) {
-    auto provable = std::make_unique<ProvableSource>(std::move(session.source));
-    check_time(provable->prove(session.input), options);
-    session.source = std::move(provable);
+int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
+                const Sampling& sampling, SessionFlags flags) {
+  RunRequest& request = flags.run;
+  const std::atomic<bool>& stop = stop_on_signal();
+  request.options = flags.detector_options();
+  request.threads = thread_count(flags.threads);
+  request.other_inputs = {flags.config};
+  cv::setNumThreads(request.threads);
+  if (request.threads > 1) source = prefetch(std::move(source), kFramesReadAhead);
+  RunInput frames(std::move(source), input, sampling);
+  const RunOutcome outcome = run_with_progress(frames, request, stop);
+  if (!outcome.record.early_end.empty()) {
+    tell(fmt::format("loopbit: {}\n", outcome.record.early_end));
   }
-  RecordedRun recorded({.input = session.input,
-                        .description = session.source->description(),
-                        .options = options,
-                        .every = session.every,
-                        .limit = session.limit,
-                        .threads = threads,
-                        .map_path = flags.map,
-                        .arguments = session.arguments,
-                        .truth = session.truth_description},
-                       {.folder = flags.out,
-                        .overwrite = flags.overwrite,
-                        .keep_images = flags.keep_images,
-                        .map_cache_mb = flags.map_cache_mb,
-                        .inputs = inputs});
-  cv::setNumThreads(threads);
-  if (threads > 1) session.source = prefetch(std::move(session.source), kFramesReadAhead);
-  try {
-    drive(*session.source, recorded, !flags.no_report, stop_requested);
-    warn_of_damage(flags.map, recorded.map_damage());
-  } catch (const Error& error) {
-    try {
-      recorded.finish(error.what());
-    } catch (const Error&) {  // the first error is the one to tell
-    }
-    throw;
-  }
-  const std::optional<Error> fault = score(session, recorded);
-  recorded.finish(stop_requested ? "interrupt" : "end");
-  present(recorded, flags);
-  if (fault && !stop_requested) throw Error(fault->kind(), fault->what());
-  if (fault) tell(fmt::format("loopbit: {}\n", fault->what()));
-  if (flags.open && !stop_requested) open_page(recorded.folder().report_path());
-  return stop_requested ? interrupted : success;
+  warn_of_damage(request.map, outcome.map_damage);
+  const std::string report = request.evidence ? report_in(outcome.folder) : "";
+  if (!report.empty()) write_report(report, {report_run(outcome.folder)}, flags.report);
+  print_summary(outcome, report);
+  const bool is_cut_off = outcome.record.stopped_by != "end";
+  if (outcome.fault && !is_cut_off) throw Error(*outcome.fault);
+  if (outcome.fault) tell(fmt::format("loopbit: {}\n", outcome.fault->what()));
+  if (flags.open && !is_cut_off) open_page(report);
+  return is_cut_off ? interrupted : success;
 }
 
 }  // namespace loopbit::cli

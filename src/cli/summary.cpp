@@ -77,8 +77,9 @@ std::string share_text(double share, std::int64_t whole, int decimals) {
   return whole == 0 ? "-" : fmt::format("{:.{}f}", share, decimals);
 }
 
-void print_summary(const RunRecord& record, const RunFolder& folder, bool has_report) {
-  const auto& detections = folder.detections();
+void print_summary(const RunOutcome& run, const std::string& report) {
+  const RunRecord& record = run.record;
+  const auto& detections = run.detections;
   fmt::print("input      {} ({}), {} frames{}{}\n", printable(record.input),
              printable(record.description), detections.size(),
              record.stopped_by == "interrupt" ? ", then interrupted" : "",
@@ -91,11 +92,11 @@ void print_summary(const RunRecord& record, const RunFolder& folder, bool has_re
   print_reasons(detections);
   if (record.score) print_score(record.score->decision);
   print_times(record, detections);
-  fmt::print("written    {0}/loops.csv, {0}/run.json\n", printable(folder.path()));
+  fmt::print("written    {0}/loops.csv, {0}/run.json\n", printable(run.folder));
   if (!record.map_path.empty()) {
     fmt::print("map        {}, session {}\n", printable(record.map_path), record.map_session);
   }
-  if (has_report) fmt::print("report     {}\n", printable(folder.report_path()));
+  if (!report.empty()) fmt::print("report     {}\n", printable(report));
 }
 
 }  // namespace loopbit::cli

@@ -5,12 +5,12 @@
 #include <cstdint>
 #include <string>
 
-#include "loopbit/run_folder.hpp"
+#include "loopbit/record_run.hpp"
 
 namespace loopbit::cli {
 
-/// Prints what a finished run comes to, for people, on stdout.
-void print_summary(const RunRecord& record, const RunFolder& folder, bool has_report);
+/// Prints what a finished run comes to, for people, on stdout. `report`: its file; may be empty.
+void print_summary(const RunOutcome& run, const std::string& report);
 
 /// A share of `whole`; "-" where there is nothing to be a share of.
 std::string share_text(double share, std::int64_t whole, int decimals);

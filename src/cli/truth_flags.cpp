@@ -47,6 +47,11 @@ void TruthFlags::add_to(CLI::App& command) {
   command.add_option(names.ignore, scoring.ignore, "Queries that are not scored, one per line")
       ->type_name("FILE")
       ->needs(truth);
+  add_rules_to(command, truth);
+}
+
+void TruthFlags::add_rules_to(CLI::App& command, CLI::Option* truth) {
+  const ScoringNames& names = scoring.names;
   command
       .add_option(names.protocol, scoring.protocol, "A published scoring protocol, listed below")
       ->type_name("NAME")
@@ -84,15 +89,10 @@ void TruthFlags::add_poses_to(CLI::App& command) {
       ->type_name("FILE");
 }
 
-void TruthFlags::check(int every, std::optional<std::size_t> frames, bool all) const {
-  if (!poses.empty()) check_poses(poses, frames, every);
-  scoring.check(every, frames, all);
-}
-
 Positions TruthFlags::read_positions(const FramesRead& frames) const {
   const std::string file = poses.empty() ? scoring.poses_file() : poses;
   if (file.empty()) return {};
-  return loopbit::read_positions(file, frames.times_s, frames.every_of_truth());
+  return loopbit::read_positions(file, frames);
 }
 
 std::string list_truth_settings() {

@@ -2,12 +2,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <optional>
 #include <string>
-#include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include "loopbit/poses.hpp"
 #include "loopbit/scoring.hpp"
 
 namespace loopbit::cli {
@@ -21,17 +20,13 @@ struct TruthFlags {
   /// The flag for poses, of commands that make a report.
   void add_poses_to(CLI::App& command);
 
-  /// All files the flags name; some may be empty.
-  [[nodiscard]] std::vector<std::string> files() const {
-    return {scoring.truth, scoring.not_false, scoring.ignore, poses};
-  }
-
-  /// Throws what ScoringRequest::resolve() and read_positions() would, see ScoringRequest::check().
-  void check(int every, std::optional<std::size_t> frames, bool all = false) const;
-
   /// Where the camera was, if poses were named, as such or as the truth; else nothing. Where the
   /// frames are not known, every pose is one.
   [[nodiscard]] Positions read_positions(const FramesRead& frames) const;
+
+ private:
+  /// How the file of the flag `truth` is read, and matches judged by it.
+  void add_rules_to(CLI::App& command, CLI::Option* truth);
 };
 
 /// The settings of PoseTruthOptions and the protocols, for a command's footer.

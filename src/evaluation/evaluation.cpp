@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/judge.hpp"
 
 namespace loopbit {
 namespace {
@@ -191,62 +192,21 @@ class Scorer {
 
 }  // namespace
 
-Judge::Judge(const GroundTruth& truth, const EvaluationOptions& options)
-    : tolerance_frames_(options.tolerance_frames),
-      every_(truth.every),
-      ignored_(truth.ignored.begin(), truth.ignored.end()),
-      unknown_(truth.unknown.begin(), truth.unknown.end()) {
-  for (const PlaceRun& run : truth.same_place) same_place_[run.query].push_back(run);
-  for (const PlaceRun& run : truth.near_place) near_place_[run.query].push_back(run);
-}
+double DecisionCounts::recall() const { return share(right, positives, 0.0); }
+double DecisionCounts::precision() const { return share(right, right + wrong, 1.0); }
 
-template <typename Holds>
-bool Judge::any_run(const RunsByQuery& runs, int query, const Holds& holds) const {
-  const auto found = runs.find(in_sequence(query));
-  return found != runs.end() && std::any_of(found->second.begin(), found->second.end(), holds);
-}
-
-bool Judge::lists(const RunsByQuery& runs, int query, int match, std::int64_t tolerance) const {
-  const std::int64_t place = in_sequence(match);
-  return any_run(runs, query, [&](const PlaceRun& run) {
-    return place >= run.first - tolerance && place <= run.last + tolerance;
-  });
-}
-
-bool Judge::is_true_pair(int query, int match) const { return lists(same_place_, query, match, 0); }
-
-Judgement Judge::judge(int query, int match) const {
-  if (lists(same_place_, query, match, tolerance_frames_)) return Judgement::right;
-  const bool is_near = unknown_.contains(in_sequence(match)) || lists(near_place_, query, match, 0);
-  return is_near ? Judgement::tolerated : Judgement::wrong;
-}
-
-bool Judge::is_positive(int query) const {
-  if (is_ignored(query)) return false;
-  return any_run(same_place_, query, [&](const PlaceRun& run) {
-    const std::int64_t last_read = (std::int64_t{run.last} + tolerance_frames_) / every_ * every_;
-    return last_read >= std::int64_t{run.first} - tolerance_frames_;
-  });
-}
-
-bool Judge::is_ignored(int query) const {
-  const std::int64_t frame = in_sequence(query);
-  return ignored_.contains(frame) || unknown_.contains(frame);
-}
-
-Interval wilson_interval(std::int64_t hits, std::int64_t trials) {
-  if (trials == 0) return {};
+Interval DecisionCounts::precision_interval() const {
+  const int loops = right + wrong;
+  if (loops == 0) return {};
   constexpr double kZ = 1.959963984540054;  // the normal distribution's 97.5 % quantile
-  const auto n = static_cast<double>(trials);
-  const double p = static_cast<double>(hits) / n;
+  const double n = loops;
+  const double p = right / n;
   const double scale = 1.0 / (1.0 + kZ * kZ / n);
   const double middle = scale * (p + kZ * kZ / (2.0 * n));
   const double half = scale * kZ * std::sqrt(p * (1.0 - p) / n + kZ * kZ / (4.0 * n * n));
   return {std::max(0.0, middle - half), std::min(1.0, middle + half)};
 }
 
-double DecisionCounts::recall() const { return share(right, positives, 0.0); }
-double DecisionCounts::precision() const { return share(right, right + wrong, 1.0); }
 double PairCounts::recall() const { return share(found, positives, 0.0); }
 double PairCounts::precision() const { return share(right, right + wrong, 1.0); }
 

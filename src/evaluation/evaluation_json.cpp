@@ -3,6 +3,8 @@
 #include <nlohmann/json.hpp>
 
 #include "loopbit/evaluation.hpp"
+#include "loopbit/evaluation_fields.hpp"
+#include "loopbit/json_fields.hpp"
 
 namespace loopbit {
 namespace {
@@ -29,33 +31,9 @@ void add_lists(Json& json, const Evaluation& evaluation) {
 }  // namespace
 
 std::string to_json(const Evaluation& evaluation, bool full) {
-  const DecisionCounts& decision = evaluation.decision;
-  const PairCounts& pairs = evaluation.pairs;
-  const Interval interval = wilson_interval(decision.right, decision.right + decision.wrong);
-  const std::string& protocol = evaluation.options.protocol;
-  Json json{{"protocol", protocol.empty() ? Json() : Json(protocol)},
-            {"tolerance_frames", evaluation.options.tolerance_frames},
-            {"positives", decision.positives},
-            {"right", decision.right},
-            {"tolerated", decision.tolerated},
-            {"wrong", decision.wrong},
-            {"ignored", decision.ignored},
-            {"recall", decision.recall()},
-            {"precision", decision.precision()},
-            {"precision_interval", {interval.low, interval.high}},
-            {"recall_at_full_precision", evaluation.recall_at_full_precision},
-            {"score_at_full_precision", nullptr},
-            {"average_precision", evaluation.average_precision},
-            {"pairs",
-             {{"positives", pairs.positives},
-              {"found", pairs.found},
-              {"right", pairs.right},
-              {"wrong", pairs.wrong},
-              {"recall", pairs.recall()},
-              {"precision", pairs.precision()}}}};
-  if (evaluation.score_at_full_precision) {
-    json["score_at_full_precision"] = *evaluation.score_at_full_precision;
-  }
+  Json json;
+  JsonWriter writer(json);
+  transfer_evaluation(writer, "", evaluation);
   if (full) add_lists(json, evaluation);
   return json.dump(2);
 }

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/scoring.hpp"
 
-#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -28,8 +27,6 @@ const char* name_of(TruthKind kind) {
 
 }  // namespace
 
-int FramesRead::every_of_truth() const { return std::max(1, every / views); }
-
 Scoring ScoringRequest::resolve(const FramesRead& frames, const Scoring& known) const {
   check_fields(known.evaluation.protocol);
   if (!truth.empty()) return {read(frames), evaluation()};
@@ -38,16 +35,16 @@ Scoring ScoringRequest::resolve(const FramesRead& frames, const Scoring& known) 
   return scoring;
 }
 
-void ScoringRequest::check(int every, std::optional<std::size_t> frames, bool all) const {
+void ScoringRequest::check(const FramesRead& frames) const {
   check_fields("");
   if (truth.empty()) return;
   check_kind(truth_kind(truth));
   if (poses_file().empty()) {
-    (void)read({.every = every, .times_s = FrameTimes(frames.value_or(0)), .all = all});
+    (void)read(frames);
   } else {  // what they say needs the times of the frames
     GroundTruth others;
     add_others(others);
-    check_poses(truth, frames, every, all);
+    check_poses(truth, frames);
   }
 }
 
@@ -146,10 +143,7 @@ EvaluationOptions ScoringRequest::evaluation() const {
 
 GroundTruth ScoringRequest::read(const FramesRead& frames) const {
   check_kind(truth_kind(truth));
-  TruthOptions options = truth_options();
-  options.every = frames.every_of_truth();
-  options.all_read = frames.all;
-  GroundTruth result = read_truth(truth, options, frames.times_s);
+  GroundTruth result = read_truth(truth, truth_options(), frames);
   add_others(result);
   return result;
 }

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "loopbit/error.hpp"
+#include "loopbit/picture.hpp"
 
 namespace loopbit {
 namespace {

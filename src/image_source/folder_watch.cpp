@@ -11,7 +11,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/image_file.hpp"
 
-#include "natural_order.hpp"
+#include "sequence_lists.hpp"
 
 namespace loopbit {
 

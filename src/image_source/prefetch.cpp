@@ -20,8 +20,7 @@ class PrefetchSource final : public ImageSource {
       : source_(std::move(source)),
         size_(source_->size()),
         description_(source_->description()),
-        depth_(depth),
-        reader_([this] { read_all(); }) {}
+        depth_(depth) {}
 
   PrefetchSource(const PrefetchSource&) = delete;
   PrefetchSource& operator=(const PrefetchSource&) = delete;
@@ -34,10 +33,11 @@ class PrefetchSource final : public ImageSource {
       stop_ = true;
     }
     changed_.notify_all();
-    reader_.join();
+    if (reader_.joinable()) reader_.join();
   }
 
   bool next(Frame& frame) override {
+    if (!reader_.joinable()) reader_ = std::thread([this] { read_all(); });
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return !queue_.empty() || ended_; });
     if (queue_.empty()) {
@@ -98,7 +98,7 @@ class PrefetchSource final : public ImageSource {
   bool ended_ = false;
   bool stop_ = false;
 
-  std::thread reader_;  ///< last: it uses all the others
+  std::thread reader_;  ///< begins with the first frame that is asked for
 };
 
 }  // namespace

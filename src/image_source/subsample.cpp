@@ -14,8 +14,10 @@ namespace {
 
 class Subsample final : public ImageSource {
  public:
-  Subsample(std::unique_ptr<ImageSource> source, std::size_t every, std::size_t limit)
-      : source_(std::move(source)), every_(every), limit_(limit) {}
+  Subsample(std::unique_ptr<ImageSource> source, const Sampling& sampling)
+      : source_(std::move(source)),
+        every_(static_cast<std::size_t>(sampling.every)),
+        limit_(static_cast<std::size_t>(sampling.limit)) {}
 
   bool next(Frame& frame) override {
     if (!advance() || !source_->next(frame)) return false;
@@ -65,13 +67,16 @@ class Subsample final : public ImageSource {
 
 }  // namespace
 
-std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source, std::size_t every,
-                                       std::size_t limit) {
+std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source,
+                                       const Sampling& sampling) {
   assert(source);
-  if (every == 0) {
-    throw Error(ErrorKind::option, "every is 0, but must be 1 (all frames) or more.");
+  if (sampling.every < 1 || sampling.limit < 0) {
+    throw Error(ErrorKind::option,
+                fmt::format("every is {} and limit is {}, but every must be at least 1, and limit "
+                            "0 (no limit) or more.",
+                            sampling.every, sampling.limit));
   }
-  return std::make_unique<Subsample>(std::move(source), every, limit);
+  return std::make_unique<Subsample>(std::move(source), sampling);
 }
 
 }  // namespace loopbit

@@ -19,6 +19,7 @@
 #include "loopbit/gray_image.hpp"
 
 #include "agreement.hpp"
+#include "attached_parts.hpp"
 #include "candidate_verifier.hpp"
 #include "known_loops.hpp"
 #include "place_memory.hpp"
@@ -117,6 +118,7 @@ class LoopDetector::Impl {
   struct Observation {
     cv::Mat1f saliency;
     BinaryContent content;
+    Features all_features;  ///< with those of what moves with the camera
     Features features;
     RecentView::Look look;
     FrameContext context;
@@ -141,6 +143,7 @@ class LoopDetector::Impl {
 
     // Step 3 begins: features. They also tell how far back the present view reaches.
     surf_.extract(gray, seen.features);
+    remove_attached_parts(seen);
     detection.times.features_ms = stopwatch.lap_ms();
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, timestamp_s);
@@ -199,6 +202,7 @@ class LoopDetector::Impl {
   /// All of it or, where it throws, nothing: what needs memory comes first.
   void remember(Observation seen, const Detection& detection, const cv::Mat& image) {
     recent_view_.reserve_next();
+    attached_parts_.reserve_next(seen.all_features);
     KnownLoops found;
     if (detection.status == Status::loop) {
       const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
@@ -211,6 +215,7 @@ class LoopDetector::Impl {
     }
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
+    attached_parts_.remember(seen.all_features);
     latest_view_inliers_ = seen.context.view_inliers;
     known_loops_.take(found);
     agreement_ = std::move(agreement);
@@ -282,6 +287,14 @@ class LoopDetector::Impl {
 
   static CandidateVerifier::Query verified_query(const Observation& seen) {
     return {seen.features, seen.look.is_step, seen.context};
+  }
+
+  /// The paper knows nothing of them.
+  void remove_attached_parts(Observation& seen) const {
+    seen.all_features = seen.features;
+    if (options_.decision.count_matches) return;
+    attached_parts_.remove_from(seen.content);
+    attached_parts_.remove_from(seen.features);
   }
 
   /// How far back the view of a new frame reaches.
@@ -436,6 +449,7 @@ class LoopDetector::Impl {
   PlaceMemory memory_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   RecentView recent_view_;
+  AttachedParts attached_parts_;
   int latest_view_inliers_ = 0;  ///< see FrameContext
   Agreement agreement_;
   KnownLoops known_loops_;

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include <iterator>
 #include <map>
 #include <set>
 #include <utility>
@@ -45,9 +44,9 @@ std::string csv(const std::vector<Edge>& edges) {
       "query,match,score,query_session,query_frame,match_session,match_frame,similarity,matches,"
       "inliers\n";
   for (const auto& [query, match, loop] : edges) {
-    fmt::format_to(std::back_inserter(text), "{},{},{},{},{},{},{},{:.6f},{},{}\n", query, match,
-                   loop.score, loop.query.session, loop.query.frame, loop.match.session,
-                   loop.match.frame, loop.similarity, loop.matches, loop.inliers);
+    text += fmt::format("{},{},{},{},{},{},{},{:.6f},{},{}\n", query, match, loop.score,
+                        loop.query.session, loop.query.frame, loop.match.session, loop.match.frame,
+                        loop.similarity, loop.matches, loop.inliers);
   }
   return text;
 }

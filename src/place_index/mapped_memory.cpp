@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/write_file.hpp"
 
 namespace loopbit {
 

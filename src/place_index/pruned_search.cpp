@@ -271,11 +271,10 @@ void PrunedSearch::consider(std::size_t place, int overlap) {
   if (overlap == 0) return;
   const double xi = static_cast<double>(overlap) / std::max<int>(query_count_, store_.count(place));
   const Candidate candidate{static_cast<PlaceId>(place), xi};
-  if (found_.may_matter(xi, candidate.place) && is_within_limits(place)) found_.add(candidate);
+  if (found_.may_matter(xi, candidate.place) && is_within_limit(place)) found_.add(candidate);
 }
 
-bool PrunedSearch::is_within_limits(std::size_t place) const {
-  if (std::abs(query_count_ - store_.count(place)) > options_.max_count_difference) return false;
+bool PrunedSearch::is_within_limit(std::size_t place) const {
   // Within the map no two points are farther apart than this: there is no limit to look after.
   if (options_.max_center_distance_px >= kMaxCenterDistance_px) return true;
   const cv::Point2d apart = center(store_.content(place)) - query_center_;

@@ -74,7 +74,7 @@ class PrunedSearch {
   void compare_stretch(const Stretch& stretch);
   void compare_place(std::size_t place);
   void consider(std::size_t place, int overlap);
-  [[nodiscard]] bool is_within_limits(std::size_t place) const;
+  [[nodiscard]] bool is_within_limit(std::size_t place) const;
 
   const PlaceStore& store_;
   InstructionSet instruction_set_;

@@ -15,6 +15,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/evidence_file.hpp"
+#include "loopbit/judge.hpp"
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/revisits.hpp"
 #include "loopbit/version.hpp"
@@ -22,6 +23,7 @@
 
 #include "base64.hpp"
 #include "pictures.hpp"
+#include "report_json.hpp"
 #include "report_page.hpp"
 #include "similarity_matrix.hpp"
 

@@ -11,6 +11,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/read_file.hpp"
 #include "loopbit/run_record.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "run_files.hpp"
 

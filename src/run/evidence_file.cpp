@@ -12,6 +12,8 @@
 #include "loopbit/database.hpp"
 #include "loopbit/picture_jpeg.hpp"
 
+#include "evidence_writer.hpp"
+
 namespace loopbit {
 namespace {
 

@@ -14,9 +14,9 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/read_file.hpp"
-#include "loopbit/run_folder.hpp"
 
 #include "run_files.hpp"
+#include "run_folder.hpp"
 
 namespace loopbit {
 namespace {
@@ -196,19 +196,18 @@ FinishedRun read_run(const std::string& path) {
   return run;
 }
 
-FramesRead frames_read(const FinishedRun& run) {
+FramesRead FinishedRun::frames() const {
   FramesRead frames;
-  for (const Detection& detection : run.detections) frames.times_s.push_back(detection.timestamp_s);
-  if (!run.record) return frames;
-  frames.every = run.record->every;
-  frames.views = run.record->views;
-  frames.all = run.record->stopped_by == "end" && run.record->limit == 0;
+  for (const Detection& detection : detections) frames.times_s.push_back(detection.timestamp_s);
+  if (!record) return frames;
+  frames.every = record->sampling.every;
+  frames.all = record->stopped_by == "end" && record->sampling.limit == 0;
   return frames;
 }
 
-Scoring recorded_scoring(const FinishedRun& run) {
-  const bool was_scored = run.record && run.record->score;
-  return {run.truth, was_scored ? run.record->score->options : EvaluationOptions{}};
+Scoring FinishedRun::scoring() const {
+  const bool was_scored = record && record->score;
+  return {truth, was_scored ? record->score->options : EvaluationOptions{}};
 }
 
 MatchList match_list(const std::vector<Detection>& detections) {

@@ -8,7 +8,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "loopbit/gray_image.hpp"
 #include "loopbit/picture.hpp"
 
 namespace loopbit {

@@ -3,7 +3,12 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <system_error>
+#include <vector>
+
+#include "loopbit/detection.hpp"
+#include "loopbit/run_record.hpp"
 
 namespace loopbit {
 
@@ -25,5 +30,17 @@ inline bool is_there(const std::filesystem::path& file) {
   std::error_code error;
   return std::filesystem::exists(file, error);
 }
+
+/// The text of run.json.
+std::string to_json(const RunRecord& record);
+
+/// Reads what to_json() wrote, in this version or an earlier one. Missing values keep their
+/// defaults, and unknown keys are ignored. Throws Error (kind input) with `file`, key and value if
+/// `json` is no record of a run, or a value has another type.
+RunRecord run_record_from_json(const std::string& json, const std::string& file);
+
+/// Reads the rows of a loops.csv. A last row without a line end was cut off and is dropped. Throws
+/// Error (kind input) with file and line.
+std::vector<Detection> read_detections(const std::string& path);
 
 }  // namespace loopbit

@@ -1,16 +1,20 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "loopbit/run_folder.hpp"
+#include "run_folder.hpp"
 
 #include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
+#include <thread>
 
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <sys/utsname.h>
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/instruction_set.hpp"
 #include "loopbit/printable.hpp"
 #include "loopbit/write_file.hpp"
 
@@ -78,6 +82,44 @@ bool write_in_place(const fs::path& file, std::string text) {
   return !stream.fail();
 }
 
+std::string processor_name() {
+  std::ifstream info("/proc/cpuinfo");
+  for (std::string line; std::getline(info, line);) {
+    if (line.starts_with("model name")) return line.substr(line.find(':') + 2);
+  }
+  return "unknown";
+}
+
+double peak_memory_mib() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  constexpr double kKibPerMib = 1024.0;
+  return static_cast<double>(usage.ru_maxrss) / kKibPerMib;
+}
+
+Machine this_machine() {
+  utsname system{};
+  uname(&system);
+  return {.processor = processor_name(),
+          .cores = static_cast<int>(std::thread::hardware_concurrency()),
+          .kernel = std::string(to_string(active_instruction_set())),
+          .system = fmt::format("{} {} {}", system.sysname, system.release, system.machine)};
+}
+
+/// Peak memory is that of this process.
+RunResults run_results(const std::vector<Detection>& detections, double wall_s) {
+  RunResults results{.frames = static_cast<int>(detections.size()),
+                     .content_ms = summarize(detections, &StepTimes::content_ms),
+                     .retrieval_ms = summarize(detections, &StepTimes::retrieval_ms),
+                     .features_ms = summarize(detections, &StepTimes::features_ms),
+                     .verification_ms = summarize(detections, &StepTimes::verification_ms),
+                     .total_ms = summarize(detections, loopbit::total_ms),
+                     .peak_memory_mib = peak_memory_mib()};
+  for (const Detection& d : detections) ++results.by_status[static_cast<std::size_t>(d.status)];
+  if (wall_s > 0) results.frames_per_s = static_cast<double>(detections.size()) / wall_s;
+  return results;
+}
+
 }  // namespace
 
 RunFolder::RunFolder(const std::string& path, bool overwrite,
@@ -134,7 +176,6 @@ void RunFolder::write_positions(const std::vector<std::optional<cv::Vec3d>>& pos
 }
 
 std::string RunFolder::evidence_path() const { return (fs::path(path_) / kEvidenceFile).string(); }
-std::string RunFolder::report_path() const { return (fs::path(path_) / kReportFile).string(); }
 
 void RunFolder::write_record(const RunRecord& record) {
   RunRecord whole = record;

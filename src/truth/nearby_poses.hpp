@@ -8,7 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
-#include "loopbit/poses.hpp"
+#include "camera_poses.hpp"
 
 namespace loopbit::truth {
 

@@ -10,10 +10,10 @@
 #include <opencv2/core.hpp>
 
 #include "loopbit/error.hpp"
-#include "loopbit/poses.hpp"
 
+#include "camera_poses.hpp"
 #include "nearby_poses.hpp"
-#include "place_runs.hpp"
+#include "truth_rows.hpp"
 
 namespace loopbit {
 namespace {

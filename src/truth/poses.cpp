@@ -13,8 +13,8 @@
 #include "loopbit/error.hpp"
 #include "loopbit/text_rows.hpp"
 
-#include "frames_read.hpp"
-#include "pose_columns.hpp"
+#include "camera_poses.hpp"
+#include "truth_rows.hpp"
 
 namespace loopbit {
 namespace {
@@ -110,7 +110,7 @@ const TimedPose& nearest(const std::vector<TimedPose>& poses, double time_s) {
 }
 
 [[noreturn]] void throw_no_pose_in_time(const std::vector<TimedPose>& poses,
-                                        const std::vector<std::optional<double>>& times_s) {
+                                        const FrameTimes& times_s) {
   const auto first = std::ranges::find_if(times_s, [](const auto& t) { return t.has_value(); });
   throw Error(ErrorKind::input,
               fmt::format("The poses begin at {:.6f} s and end at {:.6f} s, but no frame is within "
@@ -119,8 +119,8 @@ const TimedPose& nearest(const std::vector<TimedPose>& poses, double time_s) {
                           poses.front().time_s, poses.back().time_s, kMaxPoseDelay_s, **first));
 }
 
-std::vector<std::optional<CameraPose>> poses_by_time(
-    const std::vector<CameraPose>& poses, const std::vector<std::optional<double>>& times_s) {
+std::vector<std::optional<CameraPose>> poses_by_time(const std::vector<CameraPose>& poses,
+                                                     const FrameTimes& times_s) {
   std::vector<TimedPose> sorted;
   sorted.reserve(poses.size());
   for (const CameraPose& pose : poses) sorted.push_back({pose.timestamp_s.value(), &pose});
@@ -143,17 +143,16 @@ bool have_times(const std::vector<CameraPose>& poses) {
 }
 
 /// See read_positions().
-std::vector<std::optional<cv::Vec3d>> positions_by_row(const std::string& path,
-                                                       const std::vector<CameraPose>& poses,
-                                                       const truth::FramesRead& frames) {
+Positions positions_by_row(const std::string& path, const std::vector<CameraPose>& poses,
+                           const FramesRead& frames) {
   check_every(frames.every);
   if (have_times(poses)) truth::check_pose_each(path, poses.size(), frames);
   truth::check_rows(path, poses.size(), "poses", frames);
   const auto step = static_cast<std::size_t>(frames.every);
-  std::vector<std::optional<cv::Vec3d>> positions_m;
-  positions_m.reserve(frames.count);
-  for (std::size_t k = 0; k < frames.count; ++k)
-    positions_m.emplace_back(poses[k * step].position_m);
+  const std::size_t count = frames.times_s.size();
+  Positions positions_m;
+  positions_m.reserve(count);
+  for (std::size_t k = 0; k < count; ++k) positions_m.emplace_back(poses[k * step].position_m);
   return positions_m;
 }
 
@@ -176,8 +175,8 @@ std::vector<CameraPose> read_poses(const std::string& path) {
   return poses;
 }
 
-std::vector<std::optional<CameraPose>> poses_of_frames(
-    const std::vector<CameraPose>& poses, const std::vector<std::optional<double>>& times_s) {
+std::vector<std::optional<CameraPose>> poses_of_frames(const std::vector<CameraPose>& poses,
+                                                       const FrameTimes& times_s) {
   const auto has_time = [](const auto& time) { return time.has_value(); };
   const bool poses_timed =
       !poses.empty() && std::ranges::all_of(poses, has_time, &CameraPose::timestamp_s);
@@ -189,31 +188,28 @@ std::vector<std::optional<CameraPose>> poses_of_frames(
                           poses.size(), times_s.size(), poses_timed ? "the frames" : "the poses"));
 }
 
-std::vector<std::optional<cv::Vec3d>> read_positions(
-    const std::string& path, const std::vector<std::optional<double>>& times_s, int every) {
+Positions read_positions(const std::string& path, FramesRead frames) {
   const std::vector<CameraPose> poses = read_poses(path);
-  const bool frames_timed =
-      std::ranges::any_of(times_s, [](const auto& time) { return time.has_value(); });
-  if (!have_times(poses) || (!frames_timed && !times_s.empty())) {
-    return times_s.empty() ? positions_by_row(path, poses, {poses.size()})
-                           : positions_by_row(path, poses, {times_s.size(), every});
+  const bool is_known = !frames.times_s.empty();
+  frames.all = false;  // of a run that ended early, too
+  if (!have_times(poses) || (is_known && !truth::has_times(frames))) {
+    if (!is_known) frames = {.times_s = FrameTimes(poses.size())};
+    return positions_by_row(path, poses, frames);
   }
-  std::vector<std::optional<cv::Vec3d>> positions_m;
-  if (times_s.empty()) return positions_m;
-  positions_m.reserve(times_s.size());
-  const auto of_frames = truth::made_of_file(path, [&] { return poses_of_frames(poses, times_s); });
+  Positions positions_m;
+  if (!is_known) return positions_m;
+  positions_m.reserve(frames.times_s.size());
+  const auto of_frames =
+      truth::made_of_file(path, [&] { return poses_of_frames(poses, frames.times_s); });
   for (const auto& pose : of_frames) {
     positions_m.push_back(pose ? std::optional(pose->position_m) : std::nullopt);
   }
   return positions_m;
 }
 
-void check_poses(const std::string& path, std::optional<std::size_t> frames, int every,
-                 bool all_read) {
+void check_poses(const std::string& path, const FramesRead& frames) {
   const std::vector<CameraPose> poses = read_poses(path);
-  if (frames && !have_times(poses)) {
-    (void)positions_by_row(path, poses, {*frames, every, all_read});
-  }
+  if (!frames.times_s.empty() && !have_times(poses)) (void)positions_by_row(path, poses, frames);
 }
 
 }  // namespace loopbit

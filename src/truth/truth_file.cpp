@@ -13,16 +13,15 @@
 #include "loopbit/image_file.hpp"
 #include "loopbit/text_rows.hpp"
 
-#include "frames_read.hpp"
+#include "camera_poses.hpp"
 #include "mat_file.hpp"
-#include "pose_columns.hpp"
 #include "truth_matrix.hpp"
+#include "truth_rows.hpp"
 
 namespace loopbit {
 namespace {
 
 using truth::TruthMatrix;
-using Times = std::vector<std::optional<double>>;
 
 constexpr std::size_t kFewestMatrixColumns = 13;
 constexpr const char* kNoPlace =
@@ -95,30 +94,31 @@ TruthMatrix parse_matrix(const std::string& path, const std::vector<TextRow>& ro
 }
 
 /// Of the frames of a matrix with so many views every so-many-th was read.
-int every_of_matrix(const TruthOptions& options) {
-  if (options.every == 1) return 1;
-  if (options.every % options.views == 0) return options.every / options.views;
+int every_of_matrix(int every, int views) {
+  if (every == 1) return 1;
+  if (every % views == 0) return every / views;
   throw Error(ErrorKind::option,
               fmt::format("Every {}-th image was read, but a frame of the matrix is {} images in "
                           "turn; read every {}-th, or all.",
-                          options.every, options.views, options.views));
+                          every, views, views));
 }
 
-GroundTruth truth_of(const TruthMatrix& matrix, const std::string& path,
-                     const TruthOptions& options, const Times& times_s) {
-  const int every = every_of_matrix(options);
-  const truth::FramesRead frames{times_s.size(), every, options.all_read};
-  const auto views = static_cast<std::size_t>(options.views);
-  if (every < options.views && frames.count > matrix.frames() &&
-      frames.count <= matrix.frames() * views) {
+GroundTruth truth_of(const TruthMatrix& matrix, const std::string& path, int views_per_frame,
+                     FramesRead frames) {
+  frames.every = every_of_matrix(frames.every, views_per_frame);
+  const std::size_t count = frames.times_s.size();
+  const auto views = static_cast<std::size_t>(views_per_frame);
+  if (frames.every < views_per_frame && count > matrix.frames() &&
+      count <= matrix.frames() * views) {
     throw Error(ErrorKind::input,
                 fmt::format("'{}' has {} frames of {} rows each, and {} images were read: where "
                             "these are its views in turn, read every {}-th.",
-                            path, matrix.frames(), views, frames.count, views));
+                            path, matrix.frames(), views, count, views));
   }
   truth::check_rows(path, matrix.frames(), "frames", frames);
-  GroundTruth truth{
-      .same_place = matrix.runs(), .every = every, .frames = static_cast<int>(matrix.frames())};
+  GroundTruth truth{.same_place = matrix.runs(),
+                    .every = frames.every,
+                    .frames = static_cast<int>(matrix.frames())};
   if (!truth.same_place.empty()) return truth;
   throw Error(ErrorKind::input, fmt::format("'{}' {}", path, kNoPlace));
 }
@@ -133,44 +133,40 @@ GroundTruth in_sequence(GroundTruth truth, int every) {
   return truth;
 }
 
-GroundTruth truth_by_time(const std::vector<CameraPose>& poses, const TruthOptions& options,
-                          const Times& times_s) {
-  PoseTruthOptions of_frames_read = options.poses;
-  of_frames_read.min_gap_frames /= options.every;
-  return in_sequence(truth_from_poses(poses_of_frames(poses, times_s), of_frames_read),
-                     options.every);
+GroundTruth truth_by_time(const std::vector<CameraPose>& poses, const PoseTruthOptions& options,
+                          const FramesRead& frames) {
+  PoseTruthOptions of_frames_read = options;
+  of_frames_read.min_gap_frames /= frames.every;
+  return in_sequence(truth_from_poses(poses_of_frames(poses, frames.times_s), of_frames_read),
+                     frames.every);
 }
 
-GroundTruth read_pose_truth(const std::string& path, const TruthOptions& options,
-                            const Times& times_s) {
+GroundTruth read_pose_truth(const std::string& path, const PoseTruthOptions& options,
+                            const FramesRead& frames) {
   const std::vector<CameraPose> poses = read_poses(path);
-  const auto has_time = [](const auto& time) { return time.has_value(); };
   const bool poses_timed = poses.front().timestamp_s.has_value();
-  if (poses_timed && times_s.empty()) {
+  if (poses_timed && frames.times_s.empty()) {
     throw Error(ErrorKind::input,
                 fmt::format("Trajectory '{}' tells poses by time: give the sequence as well, with "
                             "the times of its frames, as a run's folder or a list with the columns "
                             "frame and timestamp has them.",
                             path));
   }
-  if (poses_timed && std::ranges::any_of(times_s, has_time)) {
-    return truth::made_of_file(path, [&] { return truth_by_time(poses, options, times_s); });
+  if (poses_timed && truth::has_times(frames)) {
+    return truth::made_of_file(path, [&] { return truth_by_time(poses, options, frames); });
   }
-  const truth::FramesRead frames{times_s.size(), options.every, options.all_read};
   if (poses_timed) truth::check_pose_each(path, poses.size(), frames);
   truth::check_rows(path, poses.size(), "poses", frames);
   GroundTruth truth = truth::made_of_file(path, [&] {
-    return truth_from_poses({poses.begin(), poses.end()}, options.poses);
+    return truth_from_poses({poses.begin(), poses.end()}, options);
   });
-  truth.every = options.every;
+  truth.every = frames.every;
   truth.frames = static_cast<int>(poses.size());
   return truth;
 }
 
-GroundTruth read_run_truth(const std::string& path, const TruthOptions& options,
-                           std::size_t frames_read) {
-  const truth::FramesRead frames{frames_read, options.every, options.all_read};
-  GroundTruth truth{.same_place = read_place_runs(path), .every = options.every};
+GroundTruth read_run_truth(const std::string& path, const FramesRead& frames) {
+  GroundTruth truth{.same_place = read_place_runs(path), .every = frames.every};
   for (const PlaceRun& run : truth.same_place) truth::check_frame(path, run.query, frames);
   return truth;
 }
@@ -205,31 +201,31 @@ TruthKind truth_kind(const std::string& path) {
 }
 
 GroundTruth read_truth(const std::string& path, const TruthOptions& options,
-                       const std::vector<std::optional<double>>& times_s) {
+                       const FramesRead& frames) {
   if (options.views < 1) {
     throw Error(ErrorKind::option,
                 fmt::format("views is {}, but must be 1 (a row a frame) or more.", options.views));
   }
-  check_every(options.every);
-  if (static_cast<double>(times_s.size()) * options.every > std::numeric_limits<int>::max()) {
+  check_every(frames.every);
+  if (static_cast<double>(frames.times_s.size()) * frames.every > std::numeric_limits<int>::max()) {
     throw Error(ErrorKind::option, fmt::format("every is {}, but no frame's number may be over {}.",
-                                               options.every, std::numeric_limits<int>::max()));
+                                               frames.every, std::numeric_limits<int>::max()));
   }
   if (is_mat_file(path)) {
-    return truth_of(truth::read_mat_file(path, options.variable, options.views), path, options,
-                    times_s);
+    return truth_of(truth::read_mat_file(path, options.variable, options.views), path,
+                    options.views, frames);
   }
   if (images::is_image_name(path)) {
-    return truth_of(read_mask(path, options.views), path, options, times_s);
+    return truth_of(read_mask(path, options.views), path, options.views, frames);
   }
   const std::vector<TextRow> rows = read_rows(path);
   switch (text_kind(path, rows)) {
     case TruthKind::runs:
-      return read_run_truth(path, options, times_s.size());
+      return read_run_truth(path, frames);
     case TruthKind::poses:
-      return read_pose_truth(path, options, times_s);
+      return read_pose_truth(path, options.poses, frames);
     case TruthKind::matrix:
-      return truth_of(parse_matrix(path, rows, options.views), path, options, times_s);
+      return truth_of(parse_matrix(path, rows, options.views), path, options.views, frames);
   }
   return {};
 }

@@ -10,7 +10,7 @@
 
 #include "loopbit/error.hpp"
 
-#include "place_runs.hpp"
+#include "truth_rows.hpp"
 
 namespace loopbit::truth {
 namespace {

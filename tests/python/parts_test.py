@@ -82,7 +82,7 @@ def test_source(dataset):
     with pytest.raises(StopIteration):
         next(source)
     with pytest.raises(ValueError, match="every is 0"):
-        loopbit.open_source(dataset, every=0)
+        loopbit.open_source(dataset / "images", every=0)
     with pytest.raises(loopbit.InputError, match="nowhere"):
         loopbit.open_source("nowhere")
 

@@ -13,6 +13,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/world.hpp"
+#include "loopbit/write_file.hpp"
 
 namespace loopbit {
 namespace {

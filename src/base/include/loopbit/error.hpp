@@ -26,8 +26,4 @@ class Error : public std::runtime_error {
   ErrorKind kind_;
 };
 
-/// The Error (kind output) for a file or folder that cannot be written. Its message has the name,
-/// the reason of `errno_value`, the remedy, and what is `kept`, if not empty.
-Error cannot_write(const std::string& path, int errno_value, const std::string& kept = "");
-
 }  // namespace loopbit

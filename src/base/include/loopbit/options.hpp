@@ -41,24 +41,28 @@ void for_each_field(Visit&& visit) {
   std::apply([&](const auto&... field) { (visit(field), ...); }, Struct::fields());
 }
 
+namespace detail {
+
 /// Throws Error (kind option): `section.name is value, but must be between min and max`.
 void check_range(std::string_view section, std::string_view name, double value, double min,
                  double max);
-
-/// Throws Error for the first field of `options` that is outside its range (NaN is).
-template <typename Struct>
-void validate(const Struct& options, std::string_view section) {
-  for_each_field<Struct>([&](const auto& field) {
-    check_range(section, field.name, static_cast<double>(options.*field.member),
-                static_cast<double>(field.min), static_cast<double>(field.max));
-  });
-}
 
 /// Parses all of `text` as an integer, a number, or "true" / "false". Errors mention `name`. Throws
 /// Error (kind option) if `text` is not such a value.
 void parse_value(const std::string& text, const std::string& name, int& value);
 void parse_value(const std::string& text, const std::string& name, double& value);
 void parse_value(const std::string& text, const std::string& name, bool& value);
+
+}  // namespace detail
+
+/// Throws Error for the first field of `options` that is outside its range (NaN is).
+template <typename Struct>
+void validate(const Struct& options, std::string_view section) {
+  for_each_field<Struct>([&](const auto& field) {
+    detail::check_range(section, field.name, static_cast<double>(options.*field.member),
+                        static_cast<double>(field.min), static_cast<double>(field.max));
+  });
+}
 
 /// Sets the field `name`; returns false if there is none. Throws Error (kind option) if `text` has
 /// the wrong type or is out of range; the field is then unchanged.
@@ -69,9 +73,9 @@ bool set_field(Struct& options, std::string_view section, std::string_view name,
   for_each_field<Struct>([&](const auto& field) {
     if (field.name != name) return;
     auto value = options.*field.member;
-    parse_value(text, std::string(section) + '.' + std::string(name), value);
-    check_range(section, name, static_cast<double>(value), static_cast<double>(field.min),
-                static_cast<double>(field.max));
+    detail::parse_value(text, std::string(section) + '.' + std::string(name), value);
+    detail::check_range(section, name, static_cast<double>(value), static_cast<double>(field.min),
+                        static_cast<double>(field.max));
     options.*field.member = value;
     found = true;
   });

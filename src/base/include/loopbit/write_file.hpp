@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include "loopbit/error.hpp"
+
 namespace loopbit {
 
 /// Writes `bytes` to `path`, completely or not at all: if the disk is full, the old file remains.
@@ -14,5 +16,9 @@ void write_file(const std::string& path, std::string_view bytes);
 /// Resolves all symbolic links of `path`, whether the file exists or not. Returns `path` if the
 /// system cannot resolve it.
 std::string resolved_path(const std::string& path);
+
+/// The Error (kind output) for a file or folder that cannot be written. Its message has the name,
+/// the reason of `errno_value`, the remedy, and what is `kept`, if not empty.
+Error cannot_write(const std::string& path, int errno_value, const std::string& kept = "");
 
 }  // namespace loopbit

@@ -5,8 +5,6 @@
 #include <cstdint>
 #include <optional>
 #include <string>
-#include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include "loopbit/ground_truth.hpp"
@@ -20,53 +18,11 @@ struct EvaluationOptions {
   std::string protocol = {};  ///< name of the protocol, for the record; may be empty
 };
 
-/// The judgement of one reported match.
-enum class Judgement {
-  right,      ///< a true earlier place, or within the tolerance of one
-  tolerated,  ///< listed as near_place: neither right nor wrong
-  wrong,      ///< any other match
-};
-
-/// Ground truth, indexed to judge many matches. Queries and matches are numbered by the frames
-/// read; see GroundTruth::every. Cost per call: linear in the runs of the query.
-class Judge {
- public:
-  explicit Judge(const GroundTruth& truth, const EvaluationOptions& options = {});
-
-  [[nodiscard]] Judgement judge(int query, int match) const;
-  /// Whether truth lists exactly the frame `match` for `query`. The tolerance is ignored.
-  [[nodiscard]] bool is_true_pair(int query, int match) const;
-  /// Whether `query` is a revisit: it is scored, and it has a true earlier place.
-  [[nodiscard]] bool is_positive(int query) const;
-  [[nodiscard]] bool is_ignored(int query) const;
-
- private:
-  using RunsByQuery = std::unordered_map<std::int64_t, std::vector<PlaceRun>>;
-
-  /// Whether holds(run) is true for any run of `query`.
-  template <typename Holds>
-  [[nodiscard]] bool any_run(const RunsByQuery& runs, int query, const Holds& holds) const;
-  [[nodiscard]] bool lists(const RunsByQuery& runs, int query, int match,
-                           std::int64_t tolerance) const;
-  [[nodiscard]] std::int64_t in_sequence(int frame) const { return std::int64_t{frame} * every_; }
-
-  int tolerance_frames_;
-  int every_;
-  RunsByQuery same_place_;
-  RunsByQuery near_place_;
-  std::unordered_set<std::int64_t> ignored_;
-  std::unordered_set<std::int64_t> unknown_;
-};
-
 /// A confidence interval.
 struct Interval {
   double low = 0;
   double high = 1;
 };
-
-/// Wilson's interval (1927) for the share of `hits` in `trials`, at 95 %. It is valid even if all
-/// or none of the trials hit. [0, 1] without trials.
-[[nodiscard]] Interval wilson_interval(std::int64_t hits, std::int64_t trials);
 
 /// Counts of a detector's decisions, per query. Only the accepted match with the highest score of a
 /// query counts (the first of equal ones).
@@ -81,6 +37,9 @@ struct DecisionCounts {
   [[nodiscard]] double recall() const;
   /// right / (right + wrong); 1 without loops.
   [[nodiscard]] double precision() const;
+  /// Wilson's interval (1927) of the precision, at 95 %. It is valid even if all or none of the
+  /// loops are right. [0, 1] without loops.
+  [[nodiscard]] Interval precision_interval() const;
 };
 
 /// Counts of a detector's decisions, per pair of frames. Every accepted match counts, and every

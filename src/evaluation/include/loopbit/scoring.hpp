@@ -2,32 +2,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
 #include <optional>
 #include <string>
-#include <vector>
-
-#include <opencv2/core.hpp>
 
 #include "loopbit/evaluation.hpp"
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/truth_file.hpp"
 
 namespace loopbit {
-
-using FrameTimes = std::vector<std::optional<double>>;    ///< one per frame, if it has a time
-using Positions = std::vector<std::optional<cv::Vec3d>>;  ///< one per frame, if it is known
-
-/// The frames of a list of matches, as far as they are known.
-struct FramesRead {
-  int every = 1;            ///< only every N-th image of the input was read
-  int views = 1;            ///< images per frame of the truth (2: left, right)
-  FrameTimes times_s = {};  ///< empty if the frames are not listed
-  bool all = false;         ///< see TruthOptions::all_read
-
-  /// Only every N-th frame of the truth was read.
-  [[nodiscard]] int every_of_truth() const;
-};
 
 /// The truth to score by, and how.
 struct Scoring {
@@ -64,9 +46,9 @@ struct ScoringRequest {
   /// other or the kind of truth, otherwise as read_truth() does.
   [[nodiscard]] Scoring resolve(const FramesRead& frames, const Scoring& known = {}) const;
 
-  /// Throws what resolve() would, as far as can be told before the frames are read. There will be
-  /// `frames` of them, if that is known. `all`: see FramesRead.
-  void check(int every, std::optional<std::size_t> frames, bool all) const;
+  /// Throws what resolve() would, as far as can be told before the `frames` are read, with their
+  /// number but without their times.
+  void check(const FramesRead& frames) const;
 
   /// One line about the truth, for people; empty without a file of truth.
   [[nodiscard]] std::string description() const;

@@ -12,15 +12,6 @@ inline constexpr int kMinImageSidePx = 32;
 /// Throws Error (kind input) unless `image` has 2 dimensions and at least 32 x 32 pixels.
 void check_size(const cv::Mat& image);
 
-/// The range of grey levels of a 16-bit image, without its darkest and its brightest thousandth.
-struct GrayRange {
-  int dark = 0;
-  int bright = 65535;  ///< more than `dark`
-};
-
-/// `image`: 16-bit grey, not empty.
-GrayRange gray_range(const cv::Mat1w& image);
-
 /// Converts a camera image to the 8-bit grey image that all parts use.
 ///
 /// `image`: 8- or 16-bit unsigned, grey, BGR or BGRA, at least 32 x 32. 16-bit images are stretched

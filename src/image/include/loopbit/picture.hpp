@@ -6,6 +6,15 @@
 
 namespace loopbit {
 
+/// The range of grey levels of a 16-bit image, without its darkest and its brightest thousandth.
+struct GrayRange {
+  int dark = 0;
+  int bright = 65535;  ///< more than `dark`
+};
+
+/// `image`: 16-bit grey, not empty.
+GrayRange gray_range(const cv::Mat1w& image);
+
 /// Long side of the pictures that runs and maps keep for people.
 inline constexpr int kPictureSide_px = 256;
 

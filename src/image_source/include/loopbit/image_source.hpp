@@ -65,18 +65,24 @@ inline constexpr int kMaxMegapixels = 100;
 std::unique_ptr<ImageSource> open_source(const std::string& input,
                                          int max_megapixels = kMaxMegapixels);
 
-/// Every N-th frame of `source` (1 = all), and at most `limit` frames (0 = no limit). Other frames
-/// are skipped, not decoded. Throws Error (kind option) if `every` is 0.
-std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source, std::size_t every,
-                                       std::size_t limit);
+/// Which frames of an input are read.
+struct Sampling {
+  int every = 1;  ///< only every N-th
+  int limit = 0;  ///< at most this many; 0 = all
+};
+
+/// The frames of `source` that `sampling` leaves. Others are skipped, not decoded. Throws Error
+/// (kind option) if `every` is less than 1 or `limit` less than 0.
+std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source,
+                                       const Sampling& sampling);
 
 /// The total number of frames of `source`, opened from `input`, if it is exact, as for a folder.
 /// None for a video, which has only an estimate.
 std::optional<std::size_t> exact_size(const ImageSource& source, const std::string& input);
 
-/// Reads `source` ahead in its own thread, at most `depth` frames (at least 1). The frames and
-/// their order are the same; decoding overlaps with processing. Throws Error (kind option) if
-/// `depth` is 0.
+/// From the first frame asked for, reads ahead in a thread, at most `depth` frames (at least 1).
+/// The frames and their order are the same; decoding overlaps with processing. Throws Error (kind
+/// option) if `depth` is 0.
 std::unique_ptr<ImageSource> prefetch(std::unique_ptr<ImageSource> source, std::size_t depth);
 
 }  // namespace loopbit

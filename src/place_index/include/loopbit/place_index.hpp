@@ -33,7 +33,6 @@ struct RetrievalOptions {
   double min_similarity = 0.2;
   int shift_tolerance_columns = 4;
   int min_spacing = 3;
-  int max_count_difference = 4096;
   double max_center_distance_px = kMaxCenterDistance_px;
 
   static constexpr auto fields() {
@@ -47,8 +46,6 @@ struct RetrievalOptions {
         Field{"min_spacing", &S::min_spacing, 1, 1000,
               "smallest distance between candidates, in places; also the range of places examined "
               "around a followed way or the best candidate"},
-        Field{"max_count_difference", &S::max_count_difference, 0, 4096,
-              "largest difference between |O| of candidate and query, pixels; 4096 = no limit"},
         Field{"max_center_distance_px", &S::max_center_distance_px, 0.0, kMaxCenterDistance_px,
               "largest distance between the centres M of candidate and query, px; 90 = no limit"}};
   }
@@ -101,7 +98,7 @@ class PlaceIndex {
   /// earlier place first. Similarity is xi (Wang et al. 2019, section III-B), the maximum over all
   /// shifts of the query within the tolerance; |O1| and |O2| are counted before shifting. Going
   /// down this order, a place is skipped if it is closer than `min_spacing` to one already taken,
-  /// or beyond the limits of count and centre. The result equals that of a full scan. Empty
+  /// or its centre is beyond the limit. The result equals that of a full scan. Empty
   /// contents neither match nor are matched. Cost: bounds of all stretches, and the contents that
   /// they cannot exclude; see docs/retrieval.md. `work`, if not null, receives the amount of work.
   [[nodiscard]] std::vector<Candidate> query(const BinaryContent& content, PlaceId end,

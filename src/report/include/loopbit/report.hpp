@@ -33,7 +33,4 @@ struct ReportOptions {
 void write_report(const std::string& path, const std::vector<ReportRun>& runs,
                   const ReportOptions& options = {});
 
-/// The JSON in the page; web/src/report_data.ts describes its fields.
-std::string report_json(const std::vector<ReportRun>& runs, const ReportOptions& options = {});
-
 }  // namespace loopbit

@@ -22,28 +22,6 @@ struct StoredEvidence {
   std::vector<PointPair> inliers;
 };
 
-/// Writes evidence.db, a SQLite file with one row per frame; see docs/run_folder.md. After a crash
-/// it has all but the last 32 frames. Throws Error (kind output). About 10 KB and 1 ms per frame.
-class EvidenceWriter {
- public:
-  explicit EvidenceWriter(const std::string& path);
-  /// Saves like finish(), but ignores its error, so that a run that failed can be viewed.
-  ~EvidenceWriter();
-  EvidenceWriter(const EvidenceWriter&) = delete;
-  EvidenceWriter& operator=(const EvidenceWriter&) = delete;
-  EvidenceWriter(EvidenceWriter&&) = delete;
-  EvidenceWriter& operator=(EvidenceWriter&&) = delete;
-
-  void add(PlaceId frame, const cv::Mat& image, const Evidence& evidence);
-
-  /// Saves the remaining frames.
-  void finish();
-
- private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
-};
-
 /// Reads evidence.db. Throws Error (kind input) if it is damaged.
 class EvidenceReader {
  public:

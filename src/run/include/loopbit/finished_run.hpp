@@ -26,21 +26,17 @@ struct FinishedRun {
   /// Camera centres, one per frame; empty if the run had no poses.
   std::vector<std::optional<cv::Vec3d>> positions_m;
   std::string evidence_path;  ///< empty if there is none
+
+  /// The frames of the run, with their times.
+  [[nodiscard]] FramesRead frames() const;
+
+  /// The truth that the run was given, and how it was scored.
+  [[nodiscard]] Scoring scoring() const;
 };
 
 /// Reads a run folder, also of an interrupted run. Throws Error (kind input) if `path` has no run
 /// or one of its files is malformed.
 FinishedRun read_run(const std::string& path);
-
-/// The frames of `run`, with their times.
-FramesRead frames_read(const FinishedRun& run);
-
-/// The truth that `run` was given, and how it was scored.
-Scoring recorded_scoring(const FinishedRun& run);
-
-/// Reads the rows of a loops.csv. A last row without a line end was cut off and is dropped. Throws
-/// Error (kind input) with file and line.
-std::vector<Detection> read_detections(const std::string& path);
 
 /// Converts detections to a MatchList.
 MatchList match_list(const std::vector<Detection>& detections);

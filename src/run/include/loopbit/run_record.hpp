@@ -10,6 +10,7 @@
 
 #include "loopbit/detection.hpp"
 #include "loopbit/evaluation.hpp"
+#include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/version.hpp"
 
@@ -48,9 +49,7 @@ struct RunRecord {
   std::string input;        ///< as given by the user
   std::string description;  ///< description of the input, see ImageSource
   LoopDetectorOptions options;
-  int every = 1;  ///< only every N-th frame of the input was read
-  int views = 1;  ///< images per frame of the truth (2: left, right)
-  int limit = 0;  ///< at most this many frames were read; 0 = all
+  Sampling sampling = {};
   int threads = 1;
   int map_session = 0;        ///< session of this run, if there is a map
   std::string map_path = {};  ///< empty = none
@@ -70,20 +69,6 @@ struct RunRecord {
   /// Whether the run came to its end, or was interrupted in order.
   [[nodiscard]] bool has_ended() const { return stopped_by == "end" || stopped_by == "interrupt"; }
 };
-
-/// The text of run.json.
-std::string to_json(const RunRecord& record);
-
-/// Reads what to_json() wrote, in this version or an earlier one. Missing values keep their
-/// defaults, and unknown keys are ignored. Throws Error (kind input) with `file`, key and value if
-/// `json` is no record of a run, or a value has another type.
-RunRecord run_record_from_json(const std::string& json, const std::string& file);
-
-/// The computer that this process runs on.
-Machine this_machine();
-
-/// The results of a run that took `wall_s`; peak memory is that of this process.
-RunResults run_results(const std::vector<Detection>& detections, double wall_s);
 
 /// Total time of all steps.
 double total_ms(const StepTimes& times);

@@ -2,10 +2,20 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 namespace loopbit {
+
+using FrameTimes = std::vector<std::optional<double>>;  ///< one per frame, if it has a time
+
+/// The frames of a sequence that were read, as far as they are known.
+struct FramesRead {
+  int every = 1;            ///< only every N-th frame of the sequence
+  FrameTimes times_s = {};  ///< one per frame read; empty if they are not known
+  bool all = false;         ///< the sequence ends with them
+};
 
 /// All frames first..last show the place of frame `query`.
 struct PlaceRun {

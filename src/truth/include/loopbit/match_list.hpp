@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
+
+#include "loopbit/ground_truth.hpp"
 
 namespace loopbit {
 
@@ -21,8 +22,7 @@ struct ReportedMatch {
 /// The matches of a detector on a sequence.
 struct MatchList {
   std::vector<ReportedMatch> matches = {};  ///< in the order of the file
-  /// One per frame; empty if frames are not listed.
-  std::vector<std::optional<double>> times_s = {};
+  FrameTimes times_s = {};                  ///< empty if frames are not listed
   /// Queries whose accepted match is in another recording, which truth does not cover.
   std::vector<int> elsewhere = {};
 };

@@ -2,9 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
 #include <optional>
-#include <span>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -16,43 +14,20 @@
 
 namespace loopbit {
 
-/// Position and viewing direction of a camera in the world frame.
-struct CameraPose {
-  std::optional<double> timestamp_s;  ///< if the file has times
-  cv::Vec3d position_m;
-  cv::Vec3d ahead;  ///< the viewing direction (the camera's z axis), unit length
-};
+using Positions = std::vector<std::optional<cv::Vec3d>>;  ///< one per frame, if it is known
 
-/// Reads poses, one per row: KITTI poses (12 numbers: camera to world, 3 x 4), a TUM trajectory (8
-/// numbers: time, position, quaternion x y z w) or EuRoC states (17: time in ns, position,
-/// quaternion w x y z, 9 that are not read; of the body, not of the camera). All rows have one
-/// kind. Numbers are separated by spaces or commas; `#` begins a comment. Throws Error (kind input)
-/// with file and line.
-std::vector<CameraPose> read_poses(const std::string& path);
+/// Camera centres from a file of poses, one per frame read. A row is a KITTI pose (12 numbers:
+/// camera to world, 3 x 4), a TUM pose (8: time, position, quaternion x y z w) or a EuRoC state
+/// (17: time in ns, position, quaternion w x y z, 9 that are not read). If poses and frames have
+/// times, they are matched by time, at most 0.05 s apart. Otherwise frame k is row k * every;
+/// further rows belong to a run that ended early. If the frames are not known, all rows without
+/// times are returned. Throws Error (kind input) for a malformed row, too few rows, or if no pose
+/// is near in time; (kind option) if `every` is less than 1.
+Positions read_positions(const std::string& path, FramesRead frames);
 
-/// The pose of each frame, or none if it is unknown. If both have times, the nearest pose in time
-/// (at most kMaxPoseDelay_s away), in any order; of equal times the first row counts. Otherwise row
-/// by row. Throws Error (kind input) if neither works: no pose is near in time, or there are no
-/// times and the numbers of rows differ.
-std::vector<std::optional<CameraPose>> poses_of_frames(
-    const std::vector<CameraPose>& poses, const std::vector<std::optional<double>>& times_s);
-
-inline constexpr double kMaxPoseDelay_s = 0.05;
-
-/// Camera centres from a file of poses, one per frame read: every N-th frame of the sequence, with
-/// the times `times_s`. If poses and frames have times, they are matched by time. Otherwise frame k
-/// is row k * every; further rows belong to a run that ended early. If `times_s` is empty, the
-/// frames are unknown, and all rows without times are returned. Throws Error (kind input) as
-/// read_poses and poses_of_frames do, and if there are too few rows; (kind option) if `every` is
-/// less than 1.
-std::vector<std::optional<cv::Vec3d>> read_positions(
-    const std::string& path, const std::vector<std::optional<double>>& times_s, int every = 1);
-
-/// Throws what read_positions() would, as far as can be told before the frames are read, of which
-/// there will be `frames` if that is known; and, where these are `all_read`, that the sequence does
-/// not have as many frames as the file has rows, see TruthOptions.
-void check_poses(const std::string& path, std::optional<std::size_t> frames, int every = 1,
-                 bool all_read = false);
+/// Throws what read_positions() would, as far as can be told before the `frames` are read, with
+/// their number but without their times. If they are `all`, the file must not have more rows.
+void check_poses(const std::string& path, const FramesRead& frames);
 
 /// The rule by which two frames with known poses show the same place.
 struct PoseTruthOptions {
@@ -77,14 +52,5 @@ struct PoseTruthOptions {
               "none"}};
   }
 };
-
-/// The ground truth of poses: for each frame, the earlier frames that satisfy `options`. near_place
-/// has those within the grey radius, whatever their heading, gap or path (and all of same_place).
-/// Frames without a pose are unknown. The path is measured between frames with poses. Throws Error
-/// (kind option) for an option out of range, (kind input) for a position that is not finite or over
-/// 1e9 m, or for more than 5 million runs. Cost: grows with the runs of places within reach, not
-/// with their frames: a camera that stands still costs little.
-GroundTruth truth_from_poses(const std::vector<std::optional<CameraPose>>& poses,
-                             const PoseTruthOptions& options = {});
 
 }  // namespace loopbit

@@ -2,9 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/poses.hpp"
@@ -23,11 +21,9 @@ TruthKind truth_kind(const std::string& path);
 
 /// How to interpret a file of ground truth if its kind leaves that open.
 struct TruthOptions {
-  PoseTruthOptions poses;
-  std::string variable;   ///< of a .mat file; empty = the only square matrix in it
-  int views = 1;          ///< rows of a matrix per frame (2: left, right)
-  int every = 1;          ///< only every N-th frame of the sequence was read
-  bool all_read = false;  ///< the frames were read to the end of the sequence
+  PoseTruthOptions poses = {};
+  std::string variable = {};  ///< of a .mat file; empty = the only square matrix in it
+  int views = 1;              ///< rows of a matrix per frame (2: left, right)
 };
 
 /// Reads the ground truth of a sequence. The kind of the file is detected:
@@ -42,20 +38,19 @@ struct TruthOptions {
 /// k is rows n k to n k + n - 1, and two frames show the same place if any of their views do. At
 /// most 100,000 rows are read.
 ///
-/// Truth counts the frames of the whole sequence, and has `every` of the options. If a matrix has n
+/// Truth counts the frames of the whole sequence, and has `every` of `frames`. If a matrix has n
 /// views and only every n-th image was read (the left ones of alternating pairs), its frames are
 /// the images read. Other values of `every` above 1 must be multiples of n.
 ///
-/// `times_s` has the time of each frame read, if known (empty = the frames are unknown). A
-/// trajectory is matched by time if any frame has one. If the frames have no times, it is matched
+/// A trajectory is matched by time if any frame has one. If the frames have no times, it is matched
 /// by number and must have one row per frame of the whole sequence. Other files must not have fewer
-/// rows than frames. They may have more, as for a run that ended early, unless `all_read` is set,
-/// which also refuses later frames in a list.
+/// rows than frames. They may have more, as for a run that ended early, unless the frames are
+/// `all`, which also refuses later frames in a list.
 ///
 /// Truth without a true place is refused, unless it is by poses, or a list of no rows that names
 /// its columns. Throws Error (kind input) with file, fault and remedy. A 4541 x 4541 matrix
 /// takes well under a second.
 GroundTruth read_truth(const std::string& path, const TruthOptions& options = {},
-                       const std::vector<std::optional<double>>& times_s = {});
+                       const FramesRead& frames = {});
 
 }  // namespace loopbit

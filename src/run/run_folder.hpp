@@ -54,7 +54,6 @@ class RunFolder {
   [[nodiscard]] const std::vector<Detection>& detections() const { return detections_; }
   [[nodiscard]] const std::string& path() const { return path_; }
   [[nodiscard]] std::string evidence_path() const;
-  [[nodiscard]] std::string report_path() const;
 
  private:
   void append(const std::string& row);

@@ -4,19 +4,22 @@
 
 #include <cstddef>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/ground_truth.hpp"
 
 namespace loopbit::truth {
 
-/// Of a sequence the frames 0, every, 2 every...
-struct FramesRead {
-  std::size_t count = 0;  ///< 0 = not known
-  int every = 1;
-  bool all = false;  ///< the sequence has none after them
-};
+// Numbers in a row of poses, by which a file's format is told.
+inline constexpr std::size_t kTumColumns = 8;
+inline constexpr std::size_t kKittiColumns = 12;
+inline constexpr std::size_t kEurocColumns = 17;
+
+/// Whether any of the frames has a time.
+bool has_times(const FramesRead& frames);
 
 /// Throws Error (kind input) unless each frame of the whole sequence has one of the `poses` that
 /// the file at `path` tells by time, which the frames read do not have.
@@ -40,6 +43,15 @@ auto made_of_file(const std::string& path, const Make& make) {
   } catch (const Error& error) {
     if (error.kind() != ErrorKind::input) throw;
     throw Error(error.kind(), fmt::format("'{}': {}", path, error.what()));
+  }
+}
+
+/// Adds `places` to `runs`; lengthens the last run if it can.
+inline void add_places(std::vector<PlaceRun>& runs, const PlaceRun& places) {
+  if (!runs.empty() && runs.back().query == places.query && runs.back().last + 1 == places.first) {
+    runs.back().last = places.last;
+  } else {
+    runs.push_back(places);
   }
 }
 

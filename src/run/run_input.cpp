@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "loopbit/provable_source.hpp"
+#include "loopbit/run_input.hpp"
 
 #include <cassert>
 #include <utility>
@@ -26,11 +26,12 @@ std::string fault(const Frame& frame) {
 
 }  // namespace
 
-ProvableSource::ProvableSource(std::unique_ptr<ImageSource> source) : source_(std::move(source)) {
+RunInput::RunInput(std::unique_ptr<ImageSource> source, std::string input, const Sampling& sampling)
+    : source_(std::move(source)), input_(std::move(input)), sampling_(sampling) {
   assert(source_);
 }
 
-const Frame& ProvableSource::prove(const std::string& input) {
+const Frame& RunInput::prove() {
   if (!ahead_.empty() && ahead_.back().error.empty()) return ahead_.back();
   for (Frame frame; source_->next(frame); frame = {}) {
     frame.error = fault(frame);
@@ -41,19 +42,27 @@ const Frame& ProvableSource::prove(const std::string& input) {
   throw Error(ErrorKind::input,
               fmt::format("None of the {} frames of '{}' can be used, so no earlier run is "
                           "replaced. {}",
-                          ahead_.size(), input, ahead_.empty() ? "" : ahead_.front().error));
+                          ahead_.size(), input_, ahead_.empty() ? "" : ahead_.front().error));
 }
 
-bool ProvableSource::next(Frame& frame) {
-  if (ahead_.empty()) return source_->next(frame);
-  frame = std::move(ahead_.front());
-  ahead_.pop_front();
+bool RunInput::next(Frame& frame) {
+  if (ahead_.empty()) {
+    if (!source_->next(frame)) return false;
+  } else {
+    frame = std::move(ahead_.front());
+    ahead_.pop_front();
+  }
+  ++taken_;
   return true;
 }
 
-bool ProvableSource::skip() {
-  if (ahead_.empty()) return source_->skip();
-  ahead_.pop_front();
+bool RunInput::skip() {
+  if (ahead_.empty()) {
+    if (!source_->skip()) return false;
+  } else {
+    ahead_.pop_front();
+  }
+  ++taken_;
   return true;
 }
 

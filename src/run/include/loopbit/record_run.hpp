@@ -1,0 +1,72 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "loopbit/detection.hpp"
+#include "loopbit/error.hpp"
+#include "loopbit/ground_truth.hpp"
+#include "loopbit/map_file.hpp"
+#include "loopbit/poses.hpp"
+#include "loopbit/run_input.hpp"
+#include "loopbit/run_record.hpp"
+#include "loopbit/runner.hpp"
+#include "loopbit/scoring.hpp"
+
+namespace loopbit {
+
+/// What a run does with its input. The flags of `loopbit run` and the arguments of run_folder() in
+/// Python set these fields.
+struct RunRequest {
+  LoopDetectorOptions options = {};
+  int threads = 1;                          ///< for run.json
+  std::vector<std::string> arguments = {};  ///< of the command line, for run.json
+
+  std::string folder = {};  ///< empty = beside the map, "town_session_2" for session 2 of "town.db"
+  bool overwrite = false;   ///< an earlier run in the folder
+  bool evidence = true;     ///< store what write_report() shows
+  std::string map = {};     ///< the map to continue or to make; empty = none
+  bool keep_images = false;  ///< a small picture of each place in the map
+  std::size_t map_cache_mb = kMapCache_mb;
+
+  ScoringRequest scoring = {};
+  /// Of the frames that will be read; used if `scoring` names no file of truth.
+  std::optional<GroundTruth> truth = std::nullopt;
+  std::string truth_description = {};  ///< of `truth`, for people
+  std::string poses = {};              ///< a file; empty = the file of truth, if that has poses
+  std::optional<Positions> positions_m = std::nullopt;  ///< one per frame, in place of `poses`
+  std::vector<std::string> other_inputs = {};           ///< more files that are never replaced
+};
+
+/// What came of a run.
+struct RunOutcome {
+  std::string folder;
+  RunRecord record;
+  std::vector<Detection> detections;
+  /// The damage that was found in the map, one clause each. Damaged rows were left out.
+  std::vector<std::string> map_damage;
+  /// What turned out to be wrong with the truth or the positions. The run is kept without them.
+  std::optional<Error> fault;
+};
+
+/// Runs a new detector over `input`, writes a run folder (see docs/run_folder.md) and, if a map is
+/// given, adds the places to the map. Calls `listener` for each frame after it is saved. Once
+/// `stop` is true, ends the run in order.
+///
+/// Checks the request before it touches anything, as far as possible. The map is opened first and
+/// with `overwrite` a usable frame is read first, so that a refused run does not replace an earlier
+/// one. If the run fails, or the listener throws, run.json says why, the map has the places so far,
+/// and the exception goes on.
+///
+/// Throws Error: kind option for a request that contradicts itself or the input, or without a
+/// folder and a map; kind input for files of truth and poses and if the input has ended without a
+/// readable frame; kind output if something cannot be saved; and what MapWriter and run() throw.
+RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
+                      const std::atomic<bool>& stop);
+
+}  // namespace loopbit

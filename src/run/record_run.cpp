@@ -1,0 +1,269 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/record_run.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "loopbit/finished_run.hpp"
+#include "loopbit/picture_jpeg.hpp"
+
+#include "evidence_writer.hpp"
+#include "run_files.hpp"
+#include "run_folder.hpp"
+
+namespace loopbit {
+namespace {
+
+/// Sets `seconds` to the time that has passed, when it goes out of scope.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& seconds) : seconds_(seconds) {}
+  ~Stopwatch() {
+    seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+  Stopwatch(Stopwatch&&) = delete;
+  Stopwatch& operator=(Stopwatch&&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+/// What is known of the frames before they are read: their number, if that is sure.
+FramesRead expected_frames(const RunInput& input) {
+  const auto size = exact_size(input, input.input());
+  return {.every = input.sampling().every,
+          .times_s = FrameTimes(size.value_or(input.taken()) - input.taken()),
+          .all = size && input.sampling().limit == 0};
+}
+
+/// Throws Error (kind option) if a file that counts from the first frame cannot be used.
+void check_from_start(const RunInput& input, const RunRequest& request) {
+  if (input.taken() == 0) return;
+  const ScoringRequest& scoring = request.scoring;
+  for (const std::string& file :
+       {scoring.truth, scoring.not_false, scoring.ignore, request.poses}) {
+    if (file.empty()) continue;
+    throw Error(ErrorKind::option,
+                fmt::format("'{}' counts from the first frame, but {} frames of '{}' were already "
+                            "read; open it again.",
+                            file, input.taken(), input.input()));
+  }
+}
+
+void check_positions(const std::optional<Positions>& positions_m, std::size_t frames) {
+  if (!positions_m || positions_m->size() == frames) return;
+  throw Error(ErrorKind::option,
+              fmt::format("positions_m has {} rows, but there are {} frames; give one row per "
+                          "frame that is read.",
+                          positions_m->size(), frames));
+}
+
+/// Throws Error for what can be told before the frames are read.
+void check(const RunRequest& request, const RunInput& input, const FramesRead& frames) {
+  if (request.folder.empty() && request.map.empty()) {
+    throw Error(ErrorKind::option, "The run has no output; give a folder or a map.");
+  }
+  if (request.keep_images && request.map.empty()) {
+    throw Error(ErrorKind::option,
+                "keep_images stores images in a map; give map, or leave it out.");
+  }
+  check_from_start(input, request);
+  request.scoring.check(frames);
+  if (!frames.times_s.empty()) check_positions(request.positions_m, frames.times_s.size());
+  FramesRead at_least = frames;
+  at_least.all = false;  // a trajectory may be longer
+  if (!request.poses.empty()) check_poses(request.poses, at_least);
+}
+
+RunRecord record_of(const RunInput& input, const RunRequest& request) {
+  const std::string truth = request.scoring.description();
+  return {.input = input.input(),
+          .description = input.description(),
+          .options = request.options,
+          .sampling = input.sampling(),
+          .threads = request.threads,
+          .map_path = request.map,
+          .stopped_by = kRunning,
+          .arguments = request.arguments,
+          .truth = truth.empty() ? request.truth_description : truth};
+}
+
+/// Null without a map.
+std::shared_ptr<MapWriter> open_map(const RunInput& input, const RunRequest& request) {
+  if (request.map.empty()) return nullptr;
+  return std::make_shared<MapWriter>(request.map, request.options, input.input(),
+                                     request.keep_images ? picture_jpeg : EncodeImage{},
+                                     request.map_cache_mb);
+}
+
+bool are_unreadable(const std::vector<Detection>& detections) {
+  return std::all_of(detections.begin(), detections.end(),
+                     [](const Detection& d) { return d.status == Status::unreadable; });
+}
+
+/// Whether a run ended in `folder` before any frame was answered.
+bool is_unanswered(const std::string& folder) {
+  const auto loops = std::filesystem::path(folder) / kLoopsFile;
+  if (!is_there(loops)) return false;
+  try {
+    return are_unreadable(read_detections(loops.string()));
+  } catch (const Error&) {  // no run of ours
+    return false;
+  }
+}
+
+/// A folder that is named after a session of the map may be replaced if it is of a session that the
+/// map does not have.
+RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_session) {
+  std::vector<std::string> inputs = request.other_inputs;
+  const ScoringRequest& scoring = request.scoring;
+  inputs.insert(inputs.end(),
+                {input.input(), scoring.truth, scoring.not_false, scoring.ignore, request.poses});
+  if (!request.folder.empty()) return {request.folder, request.overwrite, inputs};
+  const auto stem = std::filesystem::path(request.map).replace_extension().string();
+  const std::string folder = fmt::format("{}_session_{}", stem, map_session);
+  return {folder, request.overwrite || is_unanswered(folder), inputs};
+}
+
+/// A run, from its folder to its end.
+class RecordedRun {
+ public:
+  RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected)
+      : input_(input),
+        request_(request),
+        frames_(std::move(expected)),
+        map_(open_map(input, request)),
+        detector_(std::in_place, request.options, map_),
+        record_(record_of(input, request)),
+        folder_(make_folder(input, request, map_ ? map_->session() : 0)) {
+    if (map_) record_.map_session = map_->session();
+    folder_.write_record(record_);
+  }
+
+  /// The map is saved and closed, even if this fails.
+  void detect(const RunListener& listener, const std::atomic<bool>& stop) {
+    const Stopwatch stopwatch(record_.wall_s);
+    const std::shared_ptr<MapWriter> map = std::move(map_);
+    LoopDetector detector = std::move(*detector_);
+    RunListener recording{.on_detection =
+                              [&](const Detection& detection) {
+                                folder_.add(detection);
+                                listener.on_detection(detection);
+                              },
+                          .on_bad_frame = listener.on_bad_frame};
+    std::optional<EvidenceWriter> evidence;
+    if (request_.evidence) {
+      evidence.emplace(folder_.evidence_path());
+      recording.on_evidence = [&](const Detection& detection, const cv::Mat& image,
+                                  const Evidence& seen) {
+        evidence->add(detection.frame, image, seen);
+      };
+    }
+    run(input_, detector, recording, stop);
+    record_.early_end = input_.early_end();
+    if (map) map_damage_ = map->damage();
+    if (evidence) evidence->finish();
+    if (map) map->finish();
+    if (!stop && are_unreadable(folder_.detections())) {
+      throw Error(ErrorKind::input, fmt::format("None of the {} frames of '{}' could be read; the "
+                                                "messages about them say why.",
+                                                folder_.detections().size(), input_.input()));
+    }
+  }
+
+  /// Scores the detections, and stores truth and positions. `is_cut_off`: by a stop.
+  void score(bool is_cut_off) {
+    const std::size_t expected = frames_.times_s.size();
+    frames_.times_s = match_list(folder_.detections()).times_s;
+    frames_.all = frames_.all && frames_.times_s.size() == expected;
+    attempt([&] { write_score(); });
+    attempt([&] { write_positions(is_cut_off); });
+  }
+
+  /// Writes the final run.json.
+  void finish(const std::string& stopped_by) {
+    record_.stopped_by = stopped_by;
+    folder_.write_record(record_);
+  }
+
+  RunOutcome outcome() && {
+    return {folder_.path(), std::move(record_), folder_.detections(), std::move(map_damage_),
+            std::move(fault_)};
+  }
+
+ private:
+  /// Only the first fault is told.
+  template <typename Step>
+  void attempt(const Step& step) {
+    try {
+      step();
+    } catch (const Error& error) {
+      if (!fault_) fault_ = error;
+    }
+  }
+
+  void write_score() {
+    const auto [truth, evaluation] = request_.scoring.resolve(frames_, {.truth = request_.truth});
+    if (!truth) return;
+    record_.score = evaluate(match_list(folder_.detections()), *truth, evaluation);
+    record_.truth_every = truth->every;
+    folder_.write_record(record_);  // the files of the truth are read by it
+    folder_.write_truth(*truth);
+  }
+
+  void write_positions(bool is_cut_off) {
+    std::optional<Positions> positions_m = request_.positions_m;
+    if (is_cut_off && positions_m) positions_m->resize(frames_.times_s.size());
+    check_positions(positions_m, frames_.times_s.size());
+    const std::string file =
+        request_.poses.empty() ? request_.scoring.poses_file() : request_.poses;
+    if (!positions_m && !file.empty()) positions_m = read_positions(file, frames_);
+    if (positions_m) folder_.write_positions(*positions_m);
+  }
+
+  RunInput& input_;
+  const RunRequest& request_;
+  FramesRead frames_;               ///< expected, then read
+  std::shared_ptr<MapWriter> map_;  ///< null without one, and after detect()
+  std::optional<LoopDetector> detector_;
+  RunRecord record_;
+  RunFolder folder_;
+  std::vector<std::string> map_damage_;
+  std::optional<Error> fault_;
+};
+
+}  // namespace
+
+RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
+                      const std::atomic<bool>& stop) {
+  const FramesRead expected = expected_frames(input);
+  check(request, input, expected);
+  if (request.overwrite || request.options.exclusion.seconds > 0) {
+    check_time(input.prove(), request.options);
+  }
+  RecordedRun run(input, request, expected);
+  try {
+    run.detect(listener, stop);
+  } catch (const std::exception& error) {
+    try {
+      run.finish(error.what());
+    } catch (const Error&) {  // the first error is the one to tell
+    }
+    throw;
+  }
+  run.score(stop);
+  run.finish(stop ? "interrupt" : "end");
+  return std::move(run).outcome();
+}
+
+}  // namespace loopbit
