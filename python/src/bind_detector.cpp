@@ -131,7 +131,7 @@ Detection query(const SharedDetector& detector, ImageArgument image,
                 std::optional<double> timestamp_s, std::optional<Ranking> ranking) {
   if (!ranking) return detector.query(std::move(image), timestamp_s, nullptr);
   std::vector<RankedPlace> places;
-  const Detection detection = detector.query(std::move(image), timestamp_s, &places);
+  Detection detection = detector.query(std::move(image), timestamp_s, &places);
   ranking->attr("clear")();
   for (const RankedPlace& place : places) ranking->append(place);
   return detection;
