@@ -42,8 +42,8 @@ Features view_with_bonnet(Random& random) {
 }
 
 void note_view(AttachedParts& parts, const Features& features) {
-  parts.reserve_next(features);
-  parts.remember(features);
+  parts.reserve_next(features.working_size_px);
+  parts.remember(features.working_size_px, features.keypoints);
 }
 
 std::size_t num_kept(const AttachedParts& parts, Features features) {
@@ -113,6 +113,7 @@ TEST(AttachedParts, AreForgottenWhereTheyAreNoLongerSeen) {
   AttachedParts parts;
   for (int i = 0; i < 16; ++i) note_view(parts, view_with_bonnet(random));
   for (int i = 0; i < 9; ++i) note_view(parts, bare_view(random));
+  note_view(parts, view_with_bonnet(random));
   const Features features = view_with_bonnet(random);
   EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
 }

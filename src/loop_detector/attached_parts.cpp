@@ -26,9 +26,9 @@ constexpr int kMinSeen = 4;
 /// Beside a part, half of the latest 6 views are enough: when the light changes, other features of
 /// it come up.
 constexpr int kViewsBeside = 6;
-/// Gaps of up to twice as many content pixels between attached spots belong to the part, too.
 /// Fewer spots are distant things that a straight path keeps in place.
 constexpr int kMinSpots = 16;
+/// Gaps of up to twice as many content pixels between attached spots belong to the part, too.
 constexpr int kHalfGap_px = 3;
 constexpr int kBeside_px = 6;
 
@@ -99,21 +99,21 @@ void AttachedParts::remove_from(Features& features) const {
   features.descriptors.resize(kept);
 }
 
-void AttachedParts::reserve_next(const Features& features) {
+void AttachedParts::reserve_next(const cv::Size& working_size_px) {
   next_.clear();
-  if (features.working_size_px == size_px_) return;
-  next_.resize(static_cast<std::size_t>(features.working_size_px.area()));
+  if (working_size_px == size_px_) return;
+  next_.resize(static_cast<std::size_t>(working_size_px.area()));
 }
 
-void AttachedParts::remember(const Features& features) {
-  if (features.working_size_px != size_px_) {
-    size_px_ = features.working_size_px;
+void AttachedParts::remember(const cv::Size& working_size_px,
+                             const std::vector<Keypoint>& keypoints) {
+  if (working_size_px != size_px_) {
+    size_px_ = working_size_px;
     views_.swap(next_);
     num_views_ = 0;
     parts_ = {};
     beside_ = {};
   }
-  const std::vector<Keypoint>& keypoints = features.keypoints;
   if (shows_last_view(keypoints)) return;
   note(keypoints);
   find_parts(keypoints);

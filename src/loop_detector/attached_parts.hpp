@@ -21,13 +21,13 @@ class AttachedParts {
   void remove_from(BinaryContent& content) const;
   void remove_from(Features& features) const;
 
-  /// Takes the memory that the next remember() of such features needs, so that it does not throw.
-  void reserve_next(const Features& features);
+  /// Takes the memory that the next remember() needs, so that it does not throw.
+  void reserve_next(const cv::Size& working_size_px);
 
-  /// Notes a frame by its features, before any were removed. One that shows the same view as the
+  /// Notes a frame by its keypoints, before any were removed. One that shows the same view as the
   /// last one noted changes nothing: a camera that stands still has no attached parts. Another
   /// working size begins anew.
-  void remember(const Features& features);
+  void remember(const cv::Size& working_size_px, const std::vector<Keypoint>& keypoints);
 
  private:
   /// Bit k is set if view k, modulo 16, has a feature within 2 px.

@@ -118,7 +118,7 @@ class LoopDetector::Impl {
   struct Observation {
     cv::Mat1f saliency;
     BinaryContent content;
-    Features all_features;  ///< with those of what moves with the camera
+    std::vector<Keypoint> all_keypoints;  ///< with those of what moves with the camera
     Features features;
     RecentView::Look look;
     FrameContext context;
@@ -202,7 +202,7 @@ class LoopDetector::Impl {
   /// All of it or, where it throws, nothing: what needs memory comes first.
   void remember(Observation seen, const Detection& detection, const cv::Mat& image) {
     recent_view_.reserve_next();
-    attached_parts_.reserve_next(seen.all_features);
+    attached_parts_.reserve_next(seen.features.working_size_px);
     KnownLoops found;
     if (detection.status == Status::loop) {
       const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
@@ -213,9 +213,10 @@ class LoopDetector::Impl {
       if (seen.best) seen.verified.push_back(*seen.best);
       agreement.remember(seen.verified);
     }
+    const cv::Size working_size_px = seen.features.working_size_px;
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
-    attached_parts_.remember(seen.all_features);
+    attached_parts_.remember(working_size_px, seen.all_keypoints);
     latest_view_inliers_ = seen.context.view_inliers;
     known_loops_.take(found);
     agreement_ = std::move(agreement);
@@ -291,8 +292,8 @@ class LoopDetector::Impl {
 
   /// The paper knows nothing of them.
   void remove_attached_parts(Observation& seen) const {
-    seen.all_features = seen.features;
     if (options_.decision.count_matches) return;
+    seen.all_keypoints = seen.features.keypoints;
     attached_parts_.remove_from(seen.content);
     attached_parts_.remove_from(seen.features);
   }
