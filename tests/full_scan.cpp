@@ -30,10 +30,11 @@ bool is_within_limit(const BinaryContent& query, const BinaryContent& place,
 }  // namespace
 
 std::vector<Candidate> full_scan(const Contents& places, const BinaryContent& query, PlaceId end,
-                                 const RetrievalOptions& options) {
+                                 const RetrievalOptions& options, const PlaceTest& is_allowed) {
   const Contents shifted = tolerated_shifts(query, options.shift_tolerance_columns);
   std::vector<Candidate> left;
   for (PlaceId i = 0; i < end; ++i) {
+    if (is_allowed && !is_allowed(i)) continue;
     const BinaryContent& place = places[static_cast<std::size_t>(i)];
     const double xi = shifted_similarity(shifted, count(query), place);
     if (xi > 0 && xi >= options.min_similarity && is_within_limit(query, place, options)) {

@@ -15,7 +15,7 @@ using Contents = std::vector<BinaryContent>;
 /// The rule of PlaceIndex::query as its header says it, without any shortcut: take the best place
 /// that is left and may be taken, again and again.
 std::vector<Candidate> full_scan(const Contents& places, const BinaryContent& query, PlaceId end,
-                                 const RetrievalOptions& options);
+                                 const RetrievalOptions& options, const PlaceTest& is_allowed = {});
 
 Contents random_contents(Random& random, int num_contents);
 

@@ -38,6 +38,18 @@ std::vector<RetrievalOptions> some_options() {
   };
 }
 
+/// Leaves out every third place, whole stretches, or nearly all places.
+PlaceTest some_test(PlaceId number) {
+  switch (number % 3) {
+    case 0:
+      return [](PlaceId place) { return place % 3 != 0; };
+    case 1:
+      return [](PlaceId place) { return place / 100 % 2 == 1; };
+    default:
+      return [](PlaceId place) { return place % 50 == 7; };
+  }
+}
+
 class PrunedSearchTest : public testing::TestWithParam<InstructionSet> {
  protected:
   static void expect_as_full_scan(const Contents& places, const Contents& queries) {
@@ -47,10 +59,12 @@ class PrunedSearchTest : public testing::TestWithParam<InstructionSet> {
     for (const BinaryContent& query : queries) {
       PlaceId end = size;
       for (const RetrievalOptions& options : some_options()) {
-        PrunedSearch search(store, end, query, options, GetParam());
-        ASSERT_EQ(search.run(), full_scan(places, query, end, options))
-            << "shift " << options.shift_tolerance_columns << ", spacing " << options.min_spacing
-            << ", most " << options.max_candidates << ", end " << end << " of " << size;
+        for (const PlaceTest& is_allowed : {PlaceTest(), some_test(end)}) {
+          PrunedSearch search(store, end, query, options, GetParam(), is_allowed);
+          ASSERT_EQ(search.run(), full_scan(places, query, end, options, is_allowed))
+              << "shift " << options.shift_tolerance_columns << ", spacing " << options.min_spacing
+              << ", most " << options.max_candidates << ", end " << end << " of " << size;
+        }
         end -= size / 37;  // ends anywhere within stretches of all lengths
       }
     }

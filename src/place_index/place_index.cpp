@@ -35,13 +35,13 @@ const BinaryContent& PlaceIndex::content(PlaceId place) const {
 }
 
 std::vector<Candidate> PlaceIndex::query(const BinaryContent& content, PlaceId end,
-                                         const RetrievalOptions& options,
-                                         RetrievalWork* work) const {
+                                         const RetrievalOptions& options, RetrievalWork* work,
+                                         const PlaceTest& is_allowed) const {
   validate(options, "retrieval");
   end = std::min(end, size());
   if (work != nullptr) *work = {};
   if (end <= 0 || count(content) == 0) return {};
-  PrunedSearch search(*store_, end, content, options, active_instruction_set());
+  PrunedSearch search(*store_, end, content, options, active_instruction_set(), is_allowed);
   std::vector<Candidate> candidates = search.run();
   if (work != nullptr) *work = search.work();
   return candidates;

@@ -52,11 +52,13 @@ void prefetch(const void* begin, std::size_t size_bytes) {
 }  // namespace
 
 PrunedSearch::PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryContent& query,
-                           const RetrievalOptions& options, InstructionSet instruction_set)
+                           const RetrievalOptions& options, InstructionSet instruction_set,
+                           PlaceTest is_allowed)
     : store_(store),
       instruction_set_(instruction_set),
       kernels_(kernels_for<BoundKernels>(instruction_set)),
       options_(options),
+      is_allowed_(std::move(is_allowed)),
       end_(static_cast<std::size_t>(end)),
       num_groups_(end_ / kGroupPlaces),
       query_count_(static_cast<std::uint16_t>(count(query))),
@@ -271,13 +273,16 @@ void PrunedSearch::consider(std::size_t place, int overlap) {
   if (overlap == 0) return;
   const double xi = static_cast<double>(overlap) / std::max<int>(query_count_, store_.count(place));
   const Candidate candidate{static_cast<PlaceId>(place), xi};
-  if (found_.may_matter(xi, candidate.place) && is_within_limit(place)) found_.add(candidate);
+  if (found_.may_matter(xi, candidate.place) && may_be_found(candidate.place)) {
+    found_.add(candidate);
+  }
 }
 
-bool PrunedSearch::is_within_limit(std::size_t place) const {
+bool PrunedSearch::may_be_found(PlaceId place) const {
+  if (is_allowed_ && !is_allowed_(place)) return false;
   // Within the map no two points are farther apart than this: there is no limit to look after.
   if (options_.max_center_distance_px >= kMaxCenterDistance_px) return true;
-  const cv::Point2d apart = center(store_.content(place)) - query_center_;
+  const cv::Point2d apart = center(store_.content(static_cast<std::size_t>(place))) - query_center_;
   return std::hypot(apart.x, apart.y) <= options_.max_center_distance_px;
 }
 

@@ -31,7 +31,8 @@ class PrunedSearch {
  public:
   /// Searches the first `end` places, at most store.size(). `query` is not empty.
   PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryContent& query,
-               const RetrievalOptions& options, InstructionSet instruction_set);
+               const RetrievalOptions& options, InstructionSet instruction_set,
+               PlaceTest is_allowed = {});
 
   [[nodiscard]] std::vector<Candidate> run();
 
@@ -74,12 +75,13 @@ class PrunedSearch {
   void compare_stretch(const Stretch& stretch);
   void compare_place(std::size_t place);
   void consider(std::size_t place, int overlap);
-  [[nodiscard]] bool is_within_limit(std::size_t place) const;
+  [[nodiscard]] bool may_be_found(PlaceId place) const;
 
   const PlaceStore& store_;
   InstructionSet instruction_set_;
   const BoundKernels& kernels_;
   RetrievalOptions options_;
+  PlaceTest is_allowed_;  ///< may be empty
   std::size_t end_;
   std::size_t num_groups_;  ///< of coarsest stretches, all of them whole
   std::uint16_t query_count_;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <tuple>
@@ -50,6 +51,9 @@ struct RetrievalOptions {
               "largest distance between the centres M of candidate and query, px; 90 = no limit"}};
   }
 };
+
+/// Whether a place may be in an answer; empty = all places may.
+using PlaceTest = std::function<bool(PlaceId)>;
 
 /// The work of one query.
 struct RetrievalWork {
@@ -101,9 +105,12 @@ class PlaceIndex {
   /// or its centre is beyond the limit. The result equals that of a full scan. Empty
   /// contents neither match nor are matched. Cost: bounds of all stretches, and the contents that
   /// they cannot exclude; see docs/retrieval.md. `work`, if not null, receives the amount of work.
+  /// Places that `is_allowed` refuses are left out as if they did not exist. It is called only for
+  /// places that would otherwise matter, in any order, at most once each.
   [[nodiscard]] std::vector<Candidate> query(const BinaryContent& content, PlaceId end,
                                              const RetrievalOptions& options = {},
-                                             RetrievalWork* work = nullptr) const;
+                                             RetrievalWork* work = nullptr,
+                                             const PlaceTest& is_allowed = {}) const;
 
  private:
   std::unique_ptr<PlaceStore> store_;
