@@ -127,6 +127,8 @@ class MemoryMap : public loopbit::MapStorage {
     contents_.push_back(content);
     features_.push_back(std::move(features));
   }
+  void remove(PlaceId /*place*/) override {}
+  void reject(const SessionFrame& /*query*/, const SessionFrame& /*match*/) override {}
 
  private:
   int session_ = 1;

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 // A detector with a map: sessions, and what may not depend on there being one.
+#include <functional>
 #include <initializer_list>
 #include <memory>
 #include <string>
@@ -9,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "loopbit/loop_detector.hpp"
+#include "loopbit/map_tools.hpp"
 
 #include "map_support.hpp"
 #include "test_support.hpp"
@@ -213,6 +215,81 @@ TEST_F(MapSession, MatchesSupportEachOtherWithinASessionOnly) {
   EXPECT_EQ(two[4].earlier_match, (SessionFrame{2, 0}));
   EXPECT_LT(two[4].score, one[4].score);
   EXPECT_GT(two[8].score, two[4].score);
+}
+
+TEST_F(MapSession, RemovedPlacesStayRemoved) {
+  drive(0, kPlaces - 1);
+  {
+    const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+    LoopDetector detector(fast_options(), map);
+    detector.remove({1, 7});
+    for (int place = 0; place < kPlaces; ++place) {
+      EXPECT_EQ(detector.process(view(place, {4, 0})).status == Status::loop, place != 7) << place;
+    }
+    detector.remove({0, 7});   // no other place shows its scene now
+    detector.remove({0, 23});  // still in view, and perhaps not yet committed
+    map->finish();
+  }
+  EXPECT_EQ(places_of(path("map.db")).size(), std::size_t{2} * kPlaces - 3);
+  EXPECT_EQ(check_map(path("map.db")).damage, std::vector<std::string>{});
+  const auto map = std::make_shared<MapReader>(path("map.db"));
+  const LoopDetector detector(fast_options(), map);
+  EXPECT_NE(detector.query(view(7, {2, 0})).status, Status::loop);
+  EXPECT_EQ(detector.query(view(23, {2, 0})).earlier_match, (SessionFrame{1, 23}));
+  EXPECT_EQ(map->damage(), std::vector<std::string>{});
+}
+
+TEST_F(MapSession, RejectedLoopsStayRejected) {
+  drive(0, kPlaces - 1);
+  MapLoop wrong;
+  {
+    const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+    LoopDetector detector(fast_options(), map);
+    for (int place = 5; place < 15; ++place) {
+      const Detection loop = detector.process(view(place, {6, 2}));
+      ASSERT_EQ(loop.earlier_match, (SessionFrame{1, place}));
+      if (place != 9) continue;
+      wrong = {{2, loop.frame}, *loop.earlier_match, loop.score,
+               loop.similarity, loop.matches,        loop.inliers};
+      detector.reject(loop);
+      detector.reject(loop);
+    }
+    expect_error(ErrorKind::option, {"map.db", "no session 7"}, [&] {
+      detector.reject({7, 1}, {1, 2});
+    });
+    map->finish();
+  }
+  MapReader map(path("map.db"));
+  EXPECT_EQ(map.loops().size(), 9U);
+  for (const MapLoop& loop : map.loops()) EXPECT_NE(loop.query.frame, wrong.query.frame);
+  EXPECT_EQ(map.rejected_loops(), std::vector<MapLoop>{wrong});
+  EXPECT_EQ(check_map(path("map.db")).damage, std::vector<std::string>{});
+}
+
+TEST_F(MapSession, AnEarlierLoopCanBeRejectedBeforeTheFirstFrame) {
+  drive(0, kPlaces - 1);
+  drive(5, 10, {6, 2});
+  {
+    const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "veto");
+    LoopDetector(fast_options(), map).reject({2, 1}, {1, 6});
+    map->finish();
+  }
+  MapReader map(path("map.db"));
+  EXPECT_EQ(map.sessions().size(), 2U) << "a session without frames is not stored";
+  EXPECT_EQ(map.loops().size(), 5U);
+  EXPECT_EQ(map.rejected_loops().at(0).query, (SessionFrame{2, 1}));
+  EXPECT_GT(map.rejected_loops().at(0).score, 0);
+  const auto reader = std::make_shared<MapReader>(path("map.db"));
+  LoopDetector asked(fast_options(), reader);
+  for (const auto& change : {std::function<void()>([&] {
+                               asked.remove({1, 3});
+                             }),
+                             std::function<void()>([&] {
+                               asked.reject({2, 2}, {1, 7});
+                             })}) {
+    expect_error(ErrorKind::option, {"map.db", "MapWriter"}, change);
+  }
+  EXPECT_EQ(asked.query(view(3, {2, 0})).earlier_match, (SessionFrame{1, 3}));
 }
 
 }  // namespace

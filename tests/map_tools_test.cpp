@@ -56,6 +56,49 @@ TEST_F(MapTools, ALoopIntoAKnownSessionIsKept) {
   EXPECT_EQ(MapReader(path("a.db")).loops().at(0).match, (SessionFrame{1, 2}));
 }
 
+TEST_F(MapTools, RejectedLoopsAndLinksAreCopied) {
+  add_session(path("b.db"), 4, "first");
+  add_session(path("b.db"), 5, "second", SessionFrame{1, 2});
+  {
+    MapWriter map(path("b.db"), fast_options(), "veto");
+    map.reject({2, 4}, {1, 2});
+    map.reject({2, 3}, {1, 1});  // never found
+  }
+  const std::vector<MapLoop> rejected = MapReader(path("b.db")).rejected_loops();
+  ASSERT_EQ(rejected.size(), 2U);
+  merge_map(path("copy.db"), path("b.db"));
+  compact_map(path("b.db"), {.max_places = 8});
+  recover_map(path("b.db"), path("recovered.db"));
+  for (const char* name : {"b.db", "copy.db", "recovered.db"}) {
+    MapReader map(path(name));
+    EXPECT_EQ(map.rejected_loops(), rejected) << name;
+    EXPECT_TRUE(map.loops().empty()) << name;
+    EXPECT_TRUE(map.sessions().at(1).linked) << name;
+    EXPECT_TRUE(check_map(path(name)).damage.empty()) << name;
+  }
+  // What met in one map did not meet the sessions of another one.
+  add_session(path("a.db"), 3);
+  merge_map(path("a.db"), path("b.db"));
+  MapReader map(path("a.db"));
+  EXPECT_FALSE(map.sessions().at(1).linked);
+  EXPECT_FALSE(map.sessions().at(2).linked);
+  EXPECT_EQ(map.rejected_loops().at(0).query, (SessionFrame{3, 4}));
+}
+
+TEST_F(MapTools, DamagedRejectedLoopsAndLinksAreListed) {
+  add_session(path("a.db"), 4);
+  add_session(path("a.db"), 4);
+  {
+    MapWriter map(path("a.db"), fast_options(), "veto");
+    map.reject({2, 3}, {1, 1});
+  }
+  change(path("a.db"), "UPDATE rejected SET match_frame = 2; UPDATE linked SET checksum = 1");
+  const MapCheck check = check_map(path("a.db"));
+  ASSERT_EQ(check.damage.size(), 3U);
+  EXPECT_EQ(check.damage[0], "linked 1: its value differs from its checksum");
+  EXPECT_EQ(check.damage[2], "rejected 1: its values differ from their checksum");
+}
+
 TEST_F(MapTools, MapsOfOtherSettingsAreNotMerged) {
   add_session(path("a.db"), 3);
   LoopDetectorOptions options = fast_options();

@@ -30,6 +30,16 @@ void SharedMap::add(const Detection& detection, const BinaryContent& content,
   storage().add(detection, content, std::move(features), image);
 }
 
+void SharedMap::remove(PlaceId place) {
+  const auto guard = lock();
+  storage().remove(place);
+}
+
+void SharedMap::reject(const SessionFrame& query, const SessionFrame& match) {
+  const auto guard = lock();
+  storage().reject(query, match);
+}
+
 std::optional<LoopDetectorOptions> SharedReader::options() const {
   const auto guard = lock();
   if (reader_.sessions().empty()) return std::nullopt;

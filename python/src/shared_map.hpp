@@ -32,6 +32,8 @@ class SharedMap : public MapStorage {
   std::shared_ptr<const Features> features(PlaceId place) final;
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& image) final;
+  void remove(PlaceId place) final;
+  void reject(const SessionFrame& query, const SessionFrame& match) final;
 
  protected:
   [[nodiscard]] std::scoped_lock<std::mutex> lock() const {

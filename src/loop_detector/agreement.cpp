@@ -19,6 +19,9 @@ constexpr std::ptrdiff_t kMaxStepsPerStep = 3;
 /// hovers sees nearly all of it again.
 constexpr double kMinWorthInRichView = 0.5;
 
+/// After so many steps little is left of a match's support.
+constexpr std::ptrdiff_t kMaxStepsToWithdraw = 10;
+
 /// With less support a way is not followed.
 constexpr double kMinFollowedSupport = 1.0;
 
@@ -68,6 +71,15 @@ void Agreement::remember(const std::vector<VerifiedCandidate>& step) {
     trails.push_back({v.candidate.place, v.step, beyond_chance(v) + before});
   }
   before_latest_ = std::exchange(latest_, std::move(trails));
+}
+
+void Agreement::withdraw(std::ptrdiff_t step, std::ptrdiff_t steps_ago) {
+  if (steps_ago > kMaxStepsToWithdraw) return;
+  const std::ptrdiff_t reach = kMaxStepsPerStep * (steps_ago + 1);
+  for (std::vector<Trail>* trails : {&latest_, &before_latest_}) {
+    std::erase_if(*trails,
+                  [&](const Trail& trail) { return std::abs(trail.step - step) <= reach; });
+  }
 }
 
 std::vector<PlaceId> Agreement::followed_places() const {

@@ -58,6 +58,10 @@ class Agreement {
   /// map of few places, of which nearly all are candidates.
   void remember(const std::vector<VerifiedCandidate>& step);
 
+  /// A match at `step`, `steps_ago` steps before the last one, was wrong: ends all ways that it may
+  /// have supported, unless it is so long ago that little of that is left.
+  void withdraw(std::ptrdiff_t step, std::ptrdiff_t steps_ago);
+
   /// Where the ways that the robot may be following stood at the last step, those with most support
   /// first: at most `options.followed_ways`, far enough apart to be different ones, and none whose
   /// support has faded to less than one inlier.

@@ -81,9 +81,10 @@ VerifiedCandidate CandidateVerifier::located(const Query& query, const VerifiedC
                                              const std::vector<VerifiedCandidate>& verified,
                                              const std::vector<Candidate>& around) {
   const std::vector<double> shared = shared_around(query, around);
-  const PlaceId first = around.front().place;
   const auto shared_at = [&](PlaceId place) {
-    return shared[static_cast<std::size_t>(place - first)];
+    const auto found = std::find_if(around.begin(), around.end(),
+                                    [&](const Candidate& c) { return c.place == place; });
+    return shared[static_cast<std::size_t>(found - around.begin())];
   };
   const PlaceId middle = candidate.candidate.place;
   std::vector<Candidate> nearer;
@@ -115,26 +116,25 @@ VerifiedCandidate CandidateVerifier::located(const Query& query, const VerifiedC
 std::vector<double> CandidateVerifier::shared_around(const Query& query,
                                                      const std::vector<Candidate>& around) {
   struct Place {
+    PlaceId number;
     std::ptrdiff_t matches;
     bool speaks;
   };
   std::vector<Place> places;
   places.reserve(around.size());
   for (const Candidate& c : around) {
-    places.push_back({std::ssize(first_look(query, c.place).matches),
+    places.push_back({c.place, std::ssize(first_look(query, c.place).matches),
                       !places_.features(c.place).keypoints.empty()});
   }
   std::vector<double> shared;
   shared.reserve(places.size());
-  for (std::ptrdiff_t middle = 0; middle < std::ssize(places); ++middle) {
-    const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, middle - kReach);
-    const std::ptrdiff_t last = std::min(std::ssize(places) - 1, middle + kReach);
+  for (const Place& middle : places) {
     std::ptrdiff_t sum = 0;
     std::ptrdiff_t weights = 0;
-    for (std::ptrdiff_t i = first; i <= last; ++i) {
-      const Place& place = places[static_cast<std::size_t>(i)];
-      if (!place.speaks) continue;
-      const std::ptrdiff_t weight = kReach + 1 - std::abs(i - middle);
+    for (const Place& place : places) {
+      const std::ptrdiff_t distance = std::abs(place.number - middle.number);
+      if (!place.speaks || distance > kReach) continue;
+      const std::ptrdiff_t weight = kReach + 1 - distance;
       sum += weight * place.matches;
       weights += weight;
     }

@@ -50,8 +50,8 @@ class CandidateVerifier {
                             std::vector<Candidate> around);
 
   /// The same evidence, and of the places next to `candidate` the one that is nearest as far as all
-  /// of them tell. `around`: consecutive places, `candidate` among them, kReach beyond those that
-  /// may be the answer on either side, where there are so many.
+  /// of them tell. `around`: the places that may be candidates, in order, `candidate` among them,
+  /// kReach beyond those that may be the answer on either side, where there are so many.
   VerifiedCandidate located(const Query& query, const VerifiedCandidate& candidate,
                             const std::vector<VerifiedCandidate>& verified,
                             const std::vector<Candidate>& around);

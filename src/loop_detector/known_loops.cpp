@@ -3,6 +3,7 @@
 #include "known_loops.hpp"
 
 #include <iterator>
+#include <utility>
 
 namespace loopbit {
 namespace {
@@ -13,21 +14,39 @@ constexpr std::ptrdiff_t kMaxStepsToLoop = 10;
 }  // namespace
 
 void KnownLoops::add(std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
-  first_visits_.try_emplace(step, first_visit(earlier_step));
+  loops_.try_emplace(step, Loop{earlier_step, first_visit(earlier_step)});
+}
+
+void KnownLoops::take(KnownLoops& others) {
+  while (!others.loops_.empty()) {
+    auto node = others.loops_.extract(others.loops_.begin());
+    node.mapped().first_visit = first_visit(node.mapped().earlier_step);
+    loops_.insert(std::move(node));
+  }
+}
+
+void KnownLoops::remove(std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
+  const auto found = loops_.find(step);
+  if (found == loops_.end() || found->second.earlier_step != earlier_step) return;
+  loops_.erase(found);
+  // Later loops may have led to the same first visit through this one.
+  KnownLoops others;
+  others.loops_.swap(loops_);
+  take(others);
 }
 
 std::ptrdiff_t KnownLoops::first_visit(std::ptrdiff_t step) const {
   std::ptrdiff_t nearest = kMaxStepsToLoop + 1;
   std::ptrdiff_t first = step;
-  const auto after = first_visits_.lower_bound(step);
-  if (after != first_visits_.begin()) {
+  const auto after = loops_.lower_bound(step);
+  if (after != loops_.begin()) {
     const auto before = std::prev(after);
     if (step - before->first < nearest) {
       nearest = step - before->first;
-      first = before->second;
+      first = before->second.first_visit;
     }
   }
-  if (after != first_visits_.end() && after->first - step < nearest) first = after->second;
+  if (after != loops_.end() && after->first - step < nearest) first = after->second.first_visit;
   return first;
 }
 

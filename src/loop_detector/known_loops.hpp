@@ -15,15 +15,23 @@ class KnownLoops {
   /// A step of the path was found to show the same place as an earlier one.
   void add(std::ptrdiff_t step, std::ptrdiff_t earlier_step);
 
-  /// Adds the loops of `others`, without those of steps that have one here. Does not throw.
-  void take(KnownLoops& others) { first_visits_.merge(others.first_visits_); }
+  /// Moves the loops of `others` here, without those of steps that have one here. Does not throw.
+  void take(KnownLoops& others);
+
+  /// Forgets that loop.
+  void remove(std::ptrdiff_t step, std::ptrdiff_t earlier_step);
 
   /// The step of the first visit to the place that `step` shows, as far as loops at most 10 steps
   /// away tell; else `step` itself. Logarithmic in the loops.
   [[nodiscard]] std::ptrdiff_t first_visit(std::ptrdiff_t step) const;
 
  private:
-  std::map<std::ptrdiff_t, std::ptrdiff_t> first_visits_;  ///< by step
+  struct Loop {
+    std::ptrdiff_t earlier_step = 0;
+    std::ptrdiff_t first_visit = 0;
+  };
+
+  std::map<std::ptrdiff_t, Loop> loops_;  ///< by step
 };
 
 }  // namespace loopbit

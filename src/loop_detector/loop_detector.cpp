@@ -20,6 +20,7 @@
 
 #include "agreement.hpp"
 #include "attached_parts.hpp"
+#include "candidate_filter.hpp"
 #include "candidate_verifier.hpp"
 #include "known_loops.hpp"
 #include "place_memory.hpp"
@@ -91,6 +92,9 @@ class LoopDetector::Impl {
   Impl(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
       : options_(options),
         memory_(std::move(map)),
+        filter_({[this](PlaceId place) { return origin(place); },
+                 [this](const SessionFrame& at) { return find(at); },
+                 [this](PlaceId place) { return spot_of(place); }}),
         agreement_(options.decision),
         surf_(options.surf),
         verifier_(options.verification),
@@ -121,6 +125,7 @@ class LoopDetector::Impl {
     std::vector<Keypoint> all_keypoints;  ///< with those of what moves with the camera
     Features features;
     RecentView::Look look;
+    PlaceTest is_allowed;  ///< as a candidate; empty = all places are
     FrameContext context;
     PlaceId compared = -1;  ///< the recent place that verification_ compares it with
     std::vector<VerifiedCandidate> verified;
@@ -129,9 +134,8 @@ class LoopDetector::Impl {
 
   /// The algorithm of Wang et al. 2019, section III.
   Detection detect(const cv::Mat& image, std::optional<double> timestamp_s,
-                   Observation& seen) const {
+                   const AllowedPlaces& allowed, Observation& seen) const {
     check_time(timestamp_s);
-    memory_.release();
     Detection detection{.frame = size(), .timestamp_s = timestamp_s};
     Stopwatch stopwatch;
 
@@ -145,21 +149,37 @@ class LoopDetector::Impl {
     surf_.extract(gray, seen.features);
     remove_attached_parts(seen);
     detection.times.features_ms = stopwatch.lap_ms();
+    recognise(seen, allowed, detection);
+    return detection;
+  }
+
+  /// The same for an observation whose content and features are known.
+  Detection detect(std::optional<double> timestamp_s, Observation& seen) const {
+    check_time(timestamp_s);
+    Detection detection{.frame = size(), .timestamp_s = timestamp_s};
+    recognise(seen, {}, detection);
+    return detection;
+  }
+
+  /// Its second half: finds the place that `seen` shows by its content and features.
+  void recognise(Observation& seen, const AllowedPlaces& allowed, Detection& detection) const {
+    memory_.release();
+    Stopwatch stopwatch;
     seen.look = look(seen);
-    const PlaceId end = first_recent_place(seen.look, timestamp_s);
+    const PlaceId end = first_recent_place(seen.look, detection.timestamp_s);
+    seen.is_allowed = filter_.test(allowed, seen.look.is_step);
     seen.context = {steps_before(end), view_inliers(seen)};
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
-    auto candidates = index_.query(seen.content, end, options_.retrieval);
-    add_expected(seen.content, end, candidates);
+    auto candidates = index_.query(seen.content, end, options_.retrieval, nullptr, seen.is_allowed);
+    add_expected(seen, end, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that geometry and the frames before agree on.
     seen.verified = candidates_.verify(verified_query(seen), candidates);
     decide(seen, end, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
-    return detection;
   }
 
   [[nodiscard]] Evidence evidence(const Observation& seen, const Detection& detection) const {
@@ -206,7 +226,7 @@ class LoopDetector::Impl {
     KnownLoops found;
     if (detection.status == Status::loop) {
       const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
-      found.add(seen.look.is_step ? latest + 1 : latest, known_loops_.first_visit(seen.best->step));
+      found.add(seen.look.is_step ? latest + 1 : latest, seen.best->step);
     }
     Agreement agreement = agreement_;
     if (seen.look.is_step) {
@@ -216,6 +236,8 @@ class LoopDetector::Impl {
     const cv::Size working_size_px = seen.features.working_size_px;
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
+    if (seen.look.is_step) filter_.note_change_of_view();
+    memory_.leave_behind([&](PlaceId removed) { return recent_view_.is_in_view(removed); });
     attached_parts_.remember(working_size_px, seen.all_keypoints);
     latest_view_inliers_ = seen.context.view_inliers;
     known_loops_.take(found);
@@ -229,6 +251,30 @@ class LoopDetector::Impl {
     return detection;
   }
 
+  /// See LoopDetector::remove.
+  void remove(const SessionFrame& at) {
+    const auto place = find(at);
+    if (!place) throw missing(at);
+    if (filter_.is_removed(*place)) return;
+    memory_.remove(*place, recent_view_.is_in_view(*place));
+    filter_.remove(*place);
+  }
+
+  /// See LoopDetector::reject. The map may have loops of places that are gone.
+  void reject(const SessionFrame& query, const SessionFrame& match) {
+    const auto place = find(query);
+    const auto wrong = find(match);
+    if (!place && query.session == 0) throw missing(query);
+    if (!wrong && match.session == 0) throw missing(match);
+    memory_.reject(query, match);
+    if (!place || !wrong) return;
+    known_loops_.remove(step_of(*place), step_of(*wrong));
+    if (*place < memory_.session_begin()) return;
+    const std::ptrdiff_t steps_ago = step_of(index_.size() - 1) - step_of(*place);
+    agreement_.withdraw(step_of(*wrong), steps_ago);
+    if (steps_ago == 0) filter_.reject(*wrong);
+  }
+
   /// Frames of this session.
   [[nodiscard]] PlaceId size() const { return index_.size() - memory_.session_begin(); }
   [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
@@ -240,6 +286,28 @@ class LoopDetector::Impl {
   [[nodiscard]] SessionFrame origin(PlaceId place) const {
     const PlaceId begin = memory_.session_begin();
     return place < begin ? memory_.origin(place) : SessionFrame{0, place - begin};
+  }
+
+  /// The reverse of origin(); none if there is no such place.
+  [[nodiscard]] std::optional<PlaceId> find(const SessionFrame& at) const {
+    if (at.session != 0) return memory_.find(at);
+    if (at.frame < 0 || at.frame >= size()) return std::nullopt;
+    return memory_.session_begin() + at.frame;
+  }
+
+  [[nodiscard]] Error missing(const SessionFrame& at) const {
+    if (at.session == 0) {
+      return {ErrorKind::option,
+              fmt::format("There is no frame {}: this session has {} so far.", at.frame, size())};
+    }
+    return {ErrorKind::option,
+            fmt::format("There is no place of session {}, frame {}: it was removed or unreadable, "
+                        "or no map has it; session 0 is this session.",
+                        at.session, at.frame)};
+  }
+
+  [[nodiscard]] Spot spot_of(PlaceId place) const {
+    return {step_of(place), known_loops_.first_visit(step_of(place))};
   }
 
   /// See VerifiedCandidate::step.
@@ -363,26 +431,30 @@ class LoopDetector::Impl {
             similarity(content, index_.content(place), options_.retrieval.shift_tolerance_columns)};
   }
 
-  /// The places below `end` that lie at most `radius` from `middle`, in order.
-  static std::vector<PlaceId> around(PlaceId middle, int radius, PlaceId end) {
+  /// The places below `end` that lie at most `radius` from `middle` and are allowed, in order.
+  static std::vector<PlaceId> around(PlaceId middle, int radius, PlaceId end,
+                                     const PlaceTest& is_allowed) {
     const PlaceId first = std::max(0, middle - radius);
     const PlaceId last = std::min(end - 1, middle + radius);
     std::vector<PlaceId> places;
-    for (PlaceId place = first; place <= last; ++place) places.push_back(place);
+    for (PlaceId place = first; place <= last; ++place) {
+      if (!is_allowed || is_allowed(place)) places.push_back(place);
+    }
     return places;
   }
 
   /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
   /// while.
-  void add_expected(const BinaryContent& content, PlaceId end,
+  void add_expected(const Observation& seen, PlaceId end,
                     std::vector<Candidate>& candidates) const {
+    const int radius = options_.retrieval.min_spacing;
     for (const PlaceId followed : agreement_.followed_places()) {
-      for (const PlaceId place : around(followed, options_.retrieval.min_spacing, end)) {
+      for (const PlaceId place : around(followed, radius, end, seen.is_allowed)) {
         const bool is_there =
             std::any_of(candidates.begin(), candidates.end(),
                         [&](const Candidate& other) { return other.place == place; });
         if (is_there) continue;
-        const Candidate expected = candidate(place, content);
+        const Candidate expected = candidate(place, seen.content);
         // Nothing is like a frame that could not be read.
         if (expected.similarity > 0) candidates.push_back(expected);
       }
@@ -390,10 +462,10 @@ class LoopDetector::Impl {
   }
 
   [[nodiscard]] std::vector<Candidate> candidates_around(PlaceId middle, int radius, PlaceId end,
-                                                         const BinaryContent& content) const {
+                                                         const Observation& seen) const {
     std::vector<Candidate> candidates;
-    for (const PlaceId place : around(middle, radius, end)) {
-      candidates.push_back(candidate(place, content));
+    for (const PlaceId place : around(middle, radius, end, seen.is_allowed)) {
+      candidates.push_back(candidate(place, seen.content));
     }
     return candidates;
   }
@@ -403,13 +475,11 @@ class LoopDetector::Impl {
                                           PlaceId end) const {
     const CandidateVerifier::Query query = verified_query(seen);
     const int radius = options_.retrieval.min_spacing;
-    const VerifiedCandidate closest =
-        candidates_.closest(query, best, seen.verified,
-                            candidates_around(best.candidate.place, radius, end, seen.content));
+    const VerifiedCandidate closest = candidates_.closest(
+        query, best, seen.verified, candidates_around(best.candidate.place, radius, end, seen));
     return candidates_.located(
         query, closest, seen.verified,
-        candidates_around(closest.candidate.place, radius + CandidateVerifier::kReach, end,
-                          seen.content));
+        candidates_around(closest.candidate.place, radius + CandidateVerifier::kReach, end, seen));
   }
 
   [[nodiscard]] Status judged(VerifiedCandidate best, const Observation& seen) const {
@@ -451,6 +521,7 @@ class LoopDetector::Impl {
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   RecentView recent_view_;
   AttachedParts attached_parts_;
+  CandidateFilter filter_;
   int latest_view_inliers_ = 0;  ///< see FrameContext
   Agreement agreement_;
   KnownLoops known_loops_;
@@ -469,23 +540,49 @@ LoopDetector::LoopDetector(LoopDetector&&) noexcept = default;
 LoopDetector& LoopDetector::operator=(LoopDetector&&) noexcept = default;
 
 Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s,
-                                Evidence* evidence) {
+                                Evidence* evidence, const AllowedPlaces& allowed) {
   Impl::Observation seen;
-  Detection detection = impl_->detect(image, timestamp_s, seen);
+  Detection detection = impl_->detect(image, timestamp_s, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
   impl_->remember(std::move(seen), detection, image);
   return detection;
 }
 
-Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timestamp_s,
-                              std::vector<RankedPlace>* ranking) const {
+Detection LoopDetector::process(const BinaryContent& content, Features features,
+                                std::optional<double> timestamp_s) {
   Impl::Observation seen;
-  Detection detection = impl_->detect(image, timestamp_s, seen);
+  seen.content = content;
+  seen.features = std::move(features);
+  const Detection detection = impl_->detect(timestamp_s, seen);
+  impl_->remember(std::move(seen), detection, cv::Mat());
+  return detection;
+}
+
+Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timestamp_s,
+                              std::vector<RankedPlace>* ranking, Evidence* evidence,
+                              const AllowedPlaces& allowed) const {
+  Impl::Observation seen;
+  Detection detection = impl_->detect(image, timestamp_s, allowed, seen);
+  if (evidence) *evidence = impl_->evidence(seen, detection);
   if (ranking) *ranking = impl_->ranked(seen);
   return detection;
 }
 
 Detection LoopDetector::skip(std::optional<double> timestamp_s) { return impl_->skip(timestamp_s); }
+
+void LoopDetector::remove(const SessionFrame& place) { impl_->remove(place); }
+
+void LoopDetector::reject(const SessionFrame& query, const SessionFrame& match) {
+  impl_->reject(query, match);
+}
+
+void LoopDetector::reject(const Detection& loop) {
+  if (!loop.match && !loop.earlier_match) {
+    throw Error(ErrorKind::option,
+                fmt::format("Frame {} has no match that could be rejected.", loop.frame));
+  }
+  reject({0, loop.frame}, loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}));
+}
 
 PlaceId LoopDetector::size() const { return impl_->size(); }
 

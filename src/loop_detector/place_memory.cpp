@@ -48,7 +48,22 @@ void PlaceMemory::add(const Detection& detection, const BinaryContent& content, 
   map_->add(detection, content, std::make_shared<const Features>(std::move(features)), image);
 }
 
+void PlaceMemory::remove(PlaceId place, bool is_in_view) {
+  if (is_in_view) removed_[place] = std::make_shared<const Features>(features(place));
+  try {
+    if (map_) map_->remove(place);
+  } catch (...) {
+    removed_.erase(place);
+    throw;
+  }
+  if (!map_) features_[static_cast<std::size_t>(place)] = {};
+}
+
 const Features& PlaceMemory::features(PlaceId place) const {
+  if (!removed_.empty()) {
+    const auto found = removed_.find(place);
+    if (found != removed_.end()) return *found->second;
+  }
   if (!map_) return features_[static_cast<std::size_t>(place)];
   held_.push_back(map_->features(place));
   return *held_.back();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -63,6 +64,24 @@ class PlaceMemory {
   void add(const Detection& detection, const BinaryContent& content, Features features,
            const cv::Mat& image);
 
+  /// Forgets a place, in the map, too. `is_in_view`: its features can be asked for until
+  /// leave_behind() lets them go. Throws as MapStorage::remove does, and stays as it was.
+  void remove(PlaceId place, bool is_in_view);
+
+  /// Lets go of the features of removed places for which `is_in_view(place)` is false.
+  template <typename IsInView>
+  void leave_behind(const IsInView& is_in_view) {
+    std::erase_if(removed_, [&](const auto& removed) { return !is_in_view(removed.first); });
+  }
+
+  /// Does nothing without a map. Throws as MapStorage::reject does.
+  void reject(const SessionFrame& query, const SessionFrame& match) {
+    if (map_) map_->reject(query, match);
+  }
+
+  /// The place of an earlier session's frame, if the map still has it.
+  [[nodiscard]] std::optional<PlaceId> find(const SessionFrame& origin) const;
+
   /// Valid until release().
   [[nodiscard]] const Features& features(PlaceId place) const;
 
@@ -75,15 +94,13 @@ class PlaceMemory {
     int step = 0;
   };
 
-  /// The place of an earlier session's frame, if the map still has it.
-  [[nodiscard]] std::optional<PlaceId> find(const SessionFrame& origin) const;
-
   void add_earlier(const SessionFrame& origin, bool is_step);
 
   std::shared_ptr<MapStorage> map_;
   std::vector<EarlierPlace> earlier_;
   std::ptrdiff_t earlier_steps_ = 0;
-  std::vector<Features> features_;  ///< without a map: of each place
+  std::vector<Features> features_;                              ///< without a map: of each place
+  std::map<PlaceId, std::shared_ptr<const Features>> removed_;  ///< those still in view
   mutable std::vector<std::shared_ptr<const Features>> held_;
 };
 

@@ -41,6 +41,11 @@ class RecentView {
   [[nodiscard]] bool empty() const { return steps_.empty(); }
   [[nodiscard]] PlaceId latest_step() const { return steps_.back(); }
 
+  /// Whether look() may ask for `place`.
+  [[nodiscard]] bool is_in_view(PlaceId place) const {
+    return far_step_ < steps_.size() && place >= steps_[far_step_];
+  }
+
   /// Where along the path `place` lies, counted in steps.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
 

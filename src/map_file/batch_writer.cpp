@@ -18,16 +18,6 @@ constexpr std::chrono::seconds kMaxDelay{1};
 /// 12 MB of features, and 50 MB of images if these are saved.
 constexpr std::size_t kMaxPendingFrames = 256;
 
-MapLoop loop_of(const Detection& detection, int session) {
-  return {
-      .query = {session, detection.frame},
-      .match = detection.earlier_match.value_or(SessionFrame{session, detection.match.value_or(0)}),
-      .score = detection.score,
-      .similarity = detection.similarity,
-      .matches = detection.matches,
-      .inliers = detection.inliers};
-}
-
 }  // namespace
 
 BatchWriter::BatchWriter(Database database, MapSession session, std::int64_t first_place,
@@ -55,11 +45,18 @@ void BatchWriter::add(AddedFrame frame) {
   if (pending_.size() == 1 || pending_.size() >= kFramesPerBatch) added_.notify_all();
 }
 
+void BatchWriter::change(std::function<void(const Database&)> change) {
+  const std::lock_guard lock(mutex_);
+  if (error_) std::rethrow_exception(error_);
+  changes_.push_back(std::move(change));
+  added_.notify_all();
+}
+
 void BatchWriter::flush() {
   std::unique_lock lock(mutex_);
   in_a_hurry_ = true;
   added_.notify_all();
-  committed_.wait(lock, [&] { return error_ || pending_.empty(); });
+  committed_.wait(lock, [&] { return error_ || (pending_.empty() && changes_.empty()); });
   in_a_hurry_ = false;
   if (error_) std::rethrow_exception(error_);
 }
@@ -87,16 +84,18 @@ void BatchWriter::close() {
 void BatchWriter::commit_batches() {
   std::unique_lock lock(mutex_);
   while (!stop_) {
-    added_.wait(lock, [&] { return stop_ || !pending_.empty(); });
+    added_.wait(lock, [&] { return stop_ || !pending_.empty() || !changes_.empty(); });
     added_.wait_for(lock, kMaxDelay,
                     [&] { return stop_ || in_a_hurry_ || pending_.size() >= kFramesPerBatch; });
     if (stop_) return;
     std::vector<AddedFrame> batch;
+    Changes changes;
     std::exception_ptr error;
     try {
       batch.assign(pending_.begin(), pending_.end());
+      changes = changes_;
       lock.unlock();
-      commit(batch);
+      commit(batch, changes);
     } catch (...) {
       error = std::current_exception();
     }
@@ -106,6 +105,8 @@ void BatchWriter::commit_batches() {
     } else {
       pending_.erase(pending_.begin(),
                      pending_.begin() + static_cast<std::ptrdiff_t>(batch.size()));
+      changes_.erase(changes_.begin(),
+                     changes_.begin() + static_cast<std::ptrdiff_t>(changes.size()));
       saved_frames_ += static_cast<std::int64_t>(batch.size());
     }
     committed_.notify_all();
@@ -113,12 +114,16 @@ void BatchWriter::commit_batches() {
   }
 }
 
-void BatchWriter::commit(const std::vector<AddedFrame>& batch) {
+void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& changes) {
   Commit commit(*database_);
   if (!rows_) rows_.emplace(*database_);
-  session_.frames = batch.back().detection.frame + 1;
-  rows_->write(session_);
+  if (!batch.empty()) {
+    if (session_.frames == 0) rows_->write_linked(session_.session);
+    session_.frames = batch.back().detection.frame + 1;
+    rows_->write(session_);
+  }
   for (const AddedFrame& frame : batch) write(frame);
+  for (const auto& change : changes) change(*database_);
   commit.end();
 }
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <deque>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -44,6 +45,9 @@ class BatchWriter {
   /// Waits while too many frames are pending. Throws the Error of an earlier frame.
   void add(AddedFrame frame);
 
+  /// Makes `change` part of a commit, after all frames that were added so far.
+  void change(std::function<void(const Database&)> change);
+
   /// Waits until all is committed. Throws the Error if it cannot be.
   void flush();
 
@@ -57,8 +61,10 @@ class BatchWriter {
   void close();
 
  private:
+  using Changes = std::vector<std::function<void(const Database&)>>;
+
   void commit_batches();
-  void commit(const std::vector<AddedFrame>& batch);
+  void commit(const std::vector<AddedFrame>& batch, const Changes& changes);
   void write(const AddedFrame& frame);
 
   std::optional<Database> database_;
@@ -71,6 +77,7 @@ class BatchWriter {
   std::condition_variable added_;
   std::condition_variable committed_;
   std::deque<AddedFrame> pending_;
+  Changes changes_;
   std::int64_t saved_frames_ = 0;
   std::exception_ptr error_;
   bool in_a_hurry_ = false;

@@ -50,6 +50,7 @@ class MapCopy {
   void copy_session(MapSession session) {
     session.session = numbers_.at(session.session);
     rows_.write(session);
+    if (session.linked) rows_.write_linked(session.session);
   }
 
   /// False if its session is not copied. `image`: may be empty.
@@ -66,6 +67,11 @@ class MapCopy {
     if (!renumber(loop.query) || !renumber(loop.match)) return false;
     rows_.write(loop);
     return true;
+  }
+
+  /// The same for a rejected one.
+  void copy_rejected(MapLoop loop) {
+    if (renumber(loop.query) && renumber(loop.match)) rows_.write_rejected(loop);
   }
 
  private:
@@ -111,6 +117,7 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
     }
   });
   for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);
+  for (const MapLoop& loop : from.rejected_loops()) copy.copy_rejected(loop);
   commit->end();
   return counts;
 }
@@ -146,6 +153,8 @@ MergePlan plan_of(const std::string& into, const Database& to, const MapReader& 
       ++plan.known;
     } else {
       plan.added.push_back(session);
+      // Those of `into` that come before it now are new to it.
+      if (!known.empty()) plan.added.back().linked = false;
     }
   }
   return plan;
@@ -186,6 +195,9 @@ MergeCounts merge(const std::string& into, const Database& to, MapReader& source
   for (const MapLoop& loop : source.loops()) {
     if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
   }
+  for (const MapLoop& loop : source.rejected_loops()) {
+    if (added.contains(loop.query.session)) copy.copy_rejected(loop);
+  }
   refuse_damaged(source.path(), source.damage());
   commit.end();
   return counts;
@@ -206,6 +218,7 @@ std::vector<MapSession> all_sessions(MapReader& map) {
       session.session = place.at.session;
       session.uid += fmt::format("-recovered-{}", place.at.session);
       session.name = "recovered";
+      session.linked = false;
       session.frames = 0;
     }
     session.frames = std::max<std::int64_t>(session.frames, place.at.frame + 1);
@@ -277,6 +290,18 @@ bool has_whole_image(const std::string& path) {
   return found;
 }
 
+/// Whether `linked` and `rejected` begin where a map of the newest version has them.
+bool has_whole_links(const std::string& path) {
+  const Database database = open_map_for_reading(path);
+  Damage damage;
+  (void)read_rejected_loops(database, damage);
+  const std::size_t before = damage.clauses().size();
+  (void)read_sessions(database, damage);
+  return before == 0 &&
+         std::none_of(damage.clauses().begin(), damage.clauses().end(),
+                      [](const std::string& clause) { return clause.starts_with("linked"); });
+}
+
 bool can_be_opened(const std::string& path) {
   try {
     const MapReader map(path);
@@ -308,8 +333,11 @@ MapCheck recover_to_new(const std::string& from, const std::string& to) {
   }
   const RepairedCopy copy(to + ".repaired");
   copy.make(from, kMapVersion);
-  // Perhaps the map began with version 1, where images begin at another page.
-  if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
+  // Perhaps the map began with an older version, where other rows are at the pages of later tables.
+  if (!has_whole_links(copy.path())) {
+    copy.make(from, kFirstVersionWithLinks - 1);
+    if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
+  }
   MapReader source(copy.path());
   MapCheck check = copy_to_new(source, to);
   check.damage.insert(check.damage.begin(), "the file: its first page cannot be read");

@@ -5,6 +5,7 @@
 #include <ctime>
 #include <new>
 #include <random>
+#include <set>
 #include <utility>
 
 #include <fmt/chrono.h>
@@ -32,6 +33,12 @@ std::string new_uid() {
   std::string uid;
   for (int i = 0; i < 4; ++i) uid += fmt::format("{:08x}", random());
   return uid;
+}
+
+Error read_only(const std::string& path) {
+  return {ErrorKind::option,
+          fmt::format("'{}' is open to be read: use LoopDetector::query, or open it by MapWriter.",
+                      path)};
 }
 
 std::string now_utc() {
@@ -82,6 +89,10 @@ void MapReader::for_each_place(const VisitPlace& visit) {
 }
 
 std::vector<MapLoop> MapReader::loops() { return read_loops(impl_->database, impl_->damage); }
+
+std::vector<MapLoop> MapReader::rejected_loops() {
+  return read_rejected_loops(impl_->database, impl_->damage);
+}
 
 std::optional<Features> MapReader::features_of(const MapPlace& place) {
   return impl_->features.read(place.id, place.at, impl_->damage);
@@ -136,10 +147,13 @@ std::shared_ptr<const Features> MapReader::features(PlaceId place) {
 
 void MapReader::add(const Detection& /*detection*/, const BinaryContent& /*content*/,
                     std::shared_ptr<const Features> /*features*/, const cv::Mat& /*image*/) {
-  throw Error(ErrorKind::option,
-              fmt::format("'{}' is open to be read: use LoopDetector::query, or open it by "
-                          "MapWriter.",
-                          impl_->path));
+  throw read_only(impl_->path);
+}
+
+void MapReader::remove(PlaceId /*place*/) { throw read_only(impl_->path); }
+
+void MapReader::reject(const SessionFrame& /*query*/, const SessionFrame& /*match*/) {
+  throw read_only(impl_->path);
 }
 
 class MapWriter::Impl {
@@ -221,6 +235,25 @@ class MapWriter::Impl {
     }
   }
 
+  void remove(PlaceId place) {
+    const std::int64_t id = stored().remove(place);
+    if (id == StoredFeatures::kNoRow) return;
+    writer_->change([id](const Database& database) { remove_place(database, id); });
+  }
+
+  void reject(SessionFrame query, SessionFrame match) {
+    (void)stored();  // not after finish()
+    for (SessionFrame* at : {&query, &match}) {
+      if (at->session == 0) at->session = session_;
+      if (at->session == session_ || sessions_.contains(at->session)) continue;
+      throw Error(ErrorKind::option, fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' "
+                                                 "shows those there are.",
+                                                 path_, at->session));
+    }
+    writer_->change(
+        [query, match](const Database& database) { reject_loop(database, query, match); });
+  }
+
   [[nodiscard]] int session() const { return session_; }
   [[nodiscard]] const Damage& damage() const { return damage_; }
   [[nodiscard]] BatchWriter& writer() const { return *writer_; }
@@ -231,6 +264,7 @@ class MapWriter::Impl {
     Database database = open_map_for_writing(path_);
     for (const MapSession& session : read_sessions(database, damage_)) {
       check_same_shape(path_, session.options, options_);
+      sessions_.insert(session.session);
     }
     database_.emplace(open_map_for_reading(path_));
     stored_.emplace(*database_, cache_mb);
@@ -263,6 +297,7 @@ class MapWriter::Impl {
   std::string path_;
   LoopDetectorOptions options_;  ///< of the session
   bool keeps_images_;
+  std::set<int> sessions_;  ///< earlier ones
   int session_ = 0;
   std::int64_t first_place_ = 0;
   PlaceId frames_ = 0;                ///< of this session
@@ -313,6 +348,12 @@ std::shared_ptr<const Features> MapWriter::features(PlaceId place) {
 void MapWriter::add(const Detection& detection, const BinaryContent& content,
                     std::shared_ptr<const Features> features, const cv::Mat& image) {
   impl().add(detection, content, std::move(features), image);
+}
+
+void MapWriter::remove(PlaceId place) { impl().remove(place); }
+
+void MapWriter::reject(const SessionFrame& query, const SessionFrame& match) {
+  impl().reject(query, match);
 }
 
 }  // namespace loopbit

@@ -225,6 +225,19 @@ Checksum checksum_of(const MapLoop& loop) {
       .add(std::int64_t{loop.inliers});
 }
 
+/// The order differs from that of loops, so that neither passes for the other.
+Checksum checksum_of_rejected(const MapLoop& loop) {
+  return checksum_of(loop.match)
+      .add(std::int64_t{loop.query.session})
+      .add(std::int64_t{loop.query.frame})
+      .add(loop.score)
+      .add(loop.similarity)
+      .add(std::int64_t{loop.matches})
+      .add(std::int64_t{loop.inliers});
+}
+
+Checksum checksum_of_linked(int session) { return Checksum().add(std::int64_t{session}); }
+
 /// -1 for values that do not fit: we never write these, and the checksum will differ.
 int narrow(std::int64_t value) {
   return value >= 0 && value <= std::numeric_limits<int>::max() ? static_cast<int>(value) : -1;
@@ -232,6 +245,61 @@ int narrow(std::int64_t value) {
 
 SessionFrame session_frame(const Statement& row, int column) {
   return {narrow(row.integer(column)), narrow(row.integer(column + 1))};
+}
+
+/// The rows of `loop` or `rejected`.
+std::vector<MapLoop> read_loops_of(const Database& database, const std::string& table,
+                                   Checksum (*checksum)(const MapLoop&), Damage& damage) {
+  std::vector<MapLoop> loops;
+  for_each_row(
+      database, table,
+      table +
+          ", session, frame, match_session, match_frame, score, similarity, matches, "
+          "inliers, checksum",
+      damage, [&](const Statement& row, std::int64_t key) {
+        const MapLoop loop{.query = session_frame(row, 1),
+                           .match = session_frame(row, 3),
+                           .score = row.real(5),
+                           .similarity = row.real(6),
+                           .matches = narrow(row.integer(7)),
+                           .inliers = narrow(row.integer(8))};
+        if (has_checksum(row, 9, checksum(loop))) {
+          loops.push_back(loop);
+        } else {
+          damage.add(fmt::format("{} {}: its values differ from their checksum", table, key));
+        }
+      });
+  return loops;
+}
+
+void write_loop(Statement& row, const MapLoop& loop, const Checksum& checksum) {
+  row.bind(1, std::int64_t{loop.query.session});
+  row.bind(2, std::int64_t{loop.query.frame});
+  row.bind(3, std::int64_t{loop.match.session});
+  row.bind(4, std::int64_t{loop.match.frame});
+  row.bind(5, loop.score);
+  row.bind(6, loop.similarity);
+  row.bind(7, std::int64_t{loop.matches});
+  row.bind(8, std::int64_t{loop.inliers});
+  row.bind(9, checksum.value());
+  row.step();
+  row.reset();
+}
+
+void mark_linked(const Database& database, std::vector<MapSession>& sessions, Damage& damage) {
+  if (sessions.empty()) return;
+  sessions.front().linked = true;  // to none
+  if (!has_links(database)) return;
+  for_each_row(database, "linked", "session, checksum", damage,
+               [&](const Statement& row, std::int64_t key) {
+                 if (!has_checksum(row, 1, checksum_of_linked(narrow(key)))) {
+                   damage.add(fmt::format("linked {}: its value differs from its checksum", key));
+                   return;
+                 }
+                 for (MapSession& session : sessions) {
+                   session.linked = session.linked || session.session == key;
+                 }
+               });
 }
 
 }  // namespace
@@ -264,6 +332,7 @@ std::vector<MapSession> read_sessions(const Database& database, Damage& damage) 
           damage.add(fmt::format("session {}: its description differs from its checksum", key));
         }
       });
+  mark_linked(database, sessions, damage);
   return sessions;
 }
 
@@ -286,24 +355,23 @@ void for_each_place(const Database& database, const std::function<void(const Map
 }
 
 std::vector<MapLoop> read_loops(const Database& database, Damage& damage) {
-  std::vector<MapLoop> loops;
-  for_each_row(database, "loop",
-               "loop, session, frame, match_session, match_frame, score, similarity, matches, "
-               "inliers, checksum",
-               damage, [&](const Statement& row, std::int64_t key) {
-                 const MapLoop loop{.query = session_frame(row, 1),
-                                    .match = session_frame(row, 3),
-                                    .score = row.real(5),
-                                    .similarity = row.real(6),
-                                    .matches = narrow(row.integer(7)),
-                                    .inliers = narrow(row.integer(8))};
-                 if (has_checksum(row, 9, checksum_of(loop))) {
-                   loops.push_back(loop);
-                 } else {
-                   damage.add(fmt::format("loop {}: its values differ from their checksum", key));
-                 }
-               });
-  return loops;
+  return read_loops_of(
+      database, "loop", [](const MapLoop& loop) { return checksum_of(loop); }, damage);
+}
+
+std::vector<MapLoop> read_rejected_loops(const Database& database, Damage& damage) {
+  if (!has_links(database)) return {};
+  return read_loops_of(database, "rejected", checksum_of_rejected, damage);
+}
+
+MapLoop loop_of(const Detection& detection, int session) {
+  return {
+      .query = {session, detection.frame},
+      .match = detection.earlier_match.value_or(SessionFrame{session, detection.match.value_or(0)}),
+      .score = detection.score,
+      .similarity = detection.similarity,
+      .matches = detection.matches,
+      .inliers = detection.inliers};
 }
 
 FeatureReader::FeatureReader(const Database& database)
@@ -366,10 +434,13 @@ RowWriter::RowWriter(const Database& database)
     : session_(database,
                "INSERT INTO session VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (session) "
                "DO UPDATE SET frames = ?7, checksum = ?8"),
+      linked_(database, "INSERT OR REPLACE INTO linked VALUES (?1, ?2)"),
       place_(database, "INSERT INTO place VALUES (?1, ?2, ?3, ?4, ?5, ?6)"),
       features_(database, "INSERT INTO features VALUES (?1, ?2, ?3)"),
       image_(database, "INSERT INTO image VALUES (?1, ?2, ?3)"),
-      loop_(database, "INSERT INTO loop VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)") {}
+      loop_(database, "INSERT INTO loop VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)"),
+      rejected_(database,
+                "INSERT INTO rejected VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)") {}
 
 void RowWriter::write(const MapSession& session) {
   session_.bind(1, std::int64_t{session.session});
@@ -410,18 +481,42 @@ void RowWriter::write_image(const MapPlace& place, std::span<const unsigned char
   image_.reset();
 }
 
-void RowWriter::write(const MapLoop& loop) {
-  loop_.bind(1, std::int64_t{loop.query.session});
-  loop_.bind(2, std::int64_t{loop.query.frame});
-  loop_.bind(3, std::int64_t{loop.match.session});
-  loop_.bind(4, std::int64_t{loop.match.frame});
-  loop_.bind(5, loop.score);
-  loop_.bind(6, loop.similarity);
-  loop_.bind(7, std::int64_t{loop.matches});
-  loop_.bind(8, std::int64_t{loop.inliers});
-  loop_.bind(9, checksum_of(loop).value());
-  loop_.step();
-  loop_.reset();
+void RowWriter::write(const MapLoop& loop) { write_loop(loop_, loop, checksum_of(loop)); }
+
+void RowWriter::write_rejected(const MapLoop& loop) {
+  write_loop(rejected_, loop, checksum_of_rejected(loop));
+}
+
+void RowWriter::write_linked(int session) {
+  linked_.bind(1, std::int64_t{session});
+  linked_.bind(2, checksum_of_linked(session).value());
+  linked_.step();
+  linked_.reset();
+}
+
+void remove_place(const Database& database, std::int64_t place) {
+  for (const char* table : {"place", "features", "image"}) {
+    database.execute(fmt::format("DELETE FROM {} WHERE place = {}", table, place));
+  }
+}
+
+void reject_loop(const Database& database, const SessionFrame& query, const SessionFrame& match) {
+  const std::string pair =
+      fmt::format("session = {} AND frame = {} AND match_session = {} AND match_frame = {}",
+                  query.session, query.frame, match.session, match.frame);
+  if (database.integer("SELECT count(*) FROM rejected WHERE " + pair) == 0) {
+    MapLoop loop{.query = query, .match = match};
+    Statement found(database, "SELECT score, similarity, matches, inliers FROM loop WHERE " + pair);
+    if (found.step()) {
+      loop.score = found.real(0);
+      loop.similarity = found.real(1);
+      loop.matches = narrow(found.integer(2));
+      loop.inliers = narrow(found.integer(3));
+    }
+    found.reset();
+    RowWriter(database).write_rejected(loop);
+  }
+  database.execute("DELETE FROM loop WHERE " + pair);
 }
 
 // The sequence alone is enough unless the map is damaged.

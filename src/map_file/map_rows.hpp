@@ -35,6 +35,7 @@ class Damage {
 /// Throws Error (kind input) if there are `clauses`: a damaged map is neither continued nor copied.
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);
 
+/// Of an older map, no session but the first is linked.
 std::vector<MapSession> read_sessions(const Database& database, Damage& damage);
 
 /// In order of id.
@@ -46,6 +47,10 @@ void for_each_image(const Database& database,
                     const std::function<void(std::int64_t, std::int64_t)>& visit, Damage& damage);
 
 std::vector<MapLoop> read_loops(const Database& database, Damage& damage);
+std::vector<MapLoop> read_rejected_loops(const Database& database, Damage& damage);
+
+/// The loop of `session` that a detection, one of a loop, is.
+MapLoop loop_of(const Detection& detection, int session);
 
 /// Reads features by place.
 class FeatureReader {
@@ -78,20 +83,33 @@ class RowWriter {
  public:
   explicit RowWriter(const Database& database);
 
-  /// Of an existing session, updates the number of frames.
+  /// Of an existing session, updates the number of frames. Does not write whether it is linked.
   void write(const MapSession& session);
+  void write_linked(int session);
   void write(const MapPlace& place, const Features& features);
   /// Does nothing if there are no bytes.
   void write_image(const MapPlace& place, std::span<const unsigned char> jpeg);
   void write(const MapLoop& loop);
+  void write_rejected(const MapLoop& loop);
 
  private:
   Statement session_;
+  Statement linked_;
   Statement place_;
   Statement features_;
   Statement image_;
   Statement loop_;
+  Statement rejected_;
 };
+
+// Changes of rows in the current transaction. They throw Error (kind output).
+
+/// Removes a place with its features and image.
+void remove_place(const Database& database, std::int64_t place);
+
+/// Moves the loop to those that are rejected. If there is no such loop, the pair is recorded all
+/// the same. Linear in the loops of the map.
+void reject_loop(const Database& database, const SessionFrame& query, const SessionFrame& match);
 
 /// The next free keys.
 int next_session(const Database& database);

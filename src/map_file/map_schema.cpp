@@ -47,7 +47,15 @@ constexpr std::array kTables{
     Table{"image",
           "CREATE TABLE image (place INTEGER PRIMARY KEY, image BLOB NOT NULL, checksum INTEGER "
           "NOT NULL)",
-          kFirstVersionWithImages}};
+          kFirstVersionWithImages},
+    Table{"linked", "CREATE TABLE linked (session INTEGER PRIMARY KEY, checksum INTEGER NOT NULL)",
+          kFirstVersionWithLinks},
+    Table{"rejected",
+          "CREATE TABLE rejected (rejected INTEGER PRIMARY KEY, session INTEGER NOT NULL, frame "
+          "INTEGER NOT NULL, match_session INTEGER NOT NULL, match_frame INTEGER NOT NULL, score "
+          "REAL NOT NULL, similarity REAL NOT NULL, matches INTEGER NOT NULL, inliers INTEGER NOT "
+          "NULL, checksum INTEGER NOT NULL)",
+          kFirstVersionWithLinks}};
 
 /// SQLite creates it for AUTOINCREMENT.
 constexpr Table kSequences{"sqlite_sequence", "CREATE TABLE sqlite_sequence(name,seq)"};
@@ -162,6 +170,10 @@ void check_may_be_written(const std::string& path) {
 
 bool has_images(const Database& database) {
   return database.integer("PRAGMA user_version") >= kFirstVersionWithImages;
+}
+
+bool has_links(const Database& database) {
+  return database.integer("PRAGMA user_version") >= kFirstVersionWithLinks;
 }
 
 Database open_map_for_writing(const std::string& path, int version) {

@@ -12,8 +12,9 @@ namespace loopbit {
 inline constexpr int kMapApplicationId = 0x6c6f6f70;
 
 /// The version of the format that this library writes. It also reads all earlier ones.
-inline constexpr int kMapVersion = 2;
+inline constexpr int kMapVersion = 3;
 inline constexpr int kFirstVersionWithImages = 2;
+inline constexpr int kFirstVersionWithLinks = 3;
 
 /// Pages are large because features take 48 KB per place and contents are read in sequence.
 inline constexpr int kMapPageBytes = 16384;
@@ -54,6 +55,9 @@ bool is_being_written(const std::string& path);
 
 /// Whether the map's version has images.
 bool has_images(const Database& database);
+
+/// Whether the map's version has the tables `linked` and `rejected`.
+bool has_links(const Database& database);
 
 /// Opens a map for reading, also while it is written. Throws Error (kind input) as above.
 Database open_map_for_reading(const std::string& path);

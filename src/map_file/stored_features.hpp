@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "loopbit/database.hpp"
@@ -63,6 +64,11 @@ class StoredFeatures {
 
   /// Gives the next number to the row `id`, which is place `at`.
   void add(std::int64_t id, const SessionFrame& at) { places_.push_back({id, at}); }
+
+  /// Forgets the row of a place, and returns it.
+  std::int64_t remove(PlaceId place) {
+    return std::exchange(places_.at(static_cast<std::size_t>(place)).id, kNoRow);
+  }
 
   [[nodiscard]] PlaceId size() const { return static_cast<PlaceId>(places_.size()); }
 

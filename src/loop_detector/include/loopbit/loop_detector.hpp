@@ -3,8 +3,11 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <span>
+#include <variant>
 #include <vector>
 
 #include <opencv2/core.hpp>
@@ -15,6 +18,13 @@
 #include "loopbit/map_storage.hpp"
 
 namespace loopbit {
+
+/// The places that may be candidates of a frame, such as those near the position that odometry or
+/// GPS gives: all of them, those for which a function returns true, or those of a list. All others
+/// are ignored, as if they did not exist. A function is called only for places that would otherwise
+/// matter. Session 0 is this session; listed places that do not exist are ignored.
+using AllowedPlaces = std::variant<std::monostate, std::function<bool(const SessionFrame&)>,
+                                   std::span<const SessionFrame>>;
 
 /// Tells for each camera image whether the camera has been here before.
 ///
@@ -49,21 +59,43 @@ class LoopDetector {
   /// `image`: 8- or 16-bit, grey, BGR or BGRA, at least 32 x 32. `timestamp_s`: in seconds, not
   /// before the previous one; only needed if the exclusion window is given in seconds. `evidence`:
   /// if not null, receives the evidence for the answer, at the cost of one more verification.
-  /// Throws Error (kind input) if the image or the time cannot be used, std::bad_alloc if there is
-  /// no memory for another place, and whatever MapStorage::add throws. In each case the detector is
-  /// unchanged.
+  /// `allowed`: restricts the candidates of this frame. Throws Error (kind input) if the image or
+  /// the time cannot be used, std::bad_alloc if there is no memory for another place, and whatever
+  /// MapStorage::add throws. In each case the detector is unchanged.
   Detection process(const cv::Mat& image, std::optional<double> timestamp_s = std::nullopt,
-                    Evidence* evidence = nullptr);
+                    Evidence* evidence = nullptr, const AllowedPlaces& allowed = {});
+
+  /// The same for an image whose content and features a MapStorage received in an earlier run. They
+  /// give the answer that the image itself would give.
+  Detection process(const BinaryContent& content, Features features,
+                    std::optional<double> timestamp_s = std::nullopt);
 
   /// The answer of process(), without adding the image. `ranking`: if not null, receives all
   /// candidates, best first, at the cost of verifying each of them. Only the first can be a loop.
   [[nodiscard]] Detection query(const cv::Mat& image,
                                 std::optional<double> timestamp_s = std::nullopt,
-                                std::vector<RankedPlace>* ranking = nullptr) const;
+                                std::vector<RankedPlace>* ranking = nullptr,
+                                Evidence* evidence = nullptr,
+                                const AllowedPlaces& allowed = {}) const;
 
   /// Counts a frame that has no usable image, so that frame numbers match the camera's. It is never
   /// a candidate.
   Detection skip(std::optional<double> timestamp_s = std::nullopt);
+
+  /// Removes a place, such as a culled key frame, also from the map. From now on it is no candidate
+  /// and affects no answer. Frames keep their numbers. Removing it again changes nothing. Throws
+  /// Error (kind option) if there is no such place, and whatever MapStorage::remove throws. Frees
+  /// its features, but not its content of 610 bytes. Session 0 is this session.
+  void remove(const SessionFrame& place);
+
+  /// Withdraws a loop that turned out to be wrong, such as one that the back end refused. Its
+  /// support for later matches ends. Frames that show the same view as `query` do not match there
+  /// again. The map records the pair as rejected. Throws Error (kind option) if there are no such
+  /// frames, and whatever MapStorage::reject throws. Session 0 is this session.
+  void reject(const SessionFrame& query, const SessionFrame& match);
+
+  /// Rejects the match of `loop`, a detection of this detector.
+  void reject(const Detection& loop);
 
   /// Number of frames in this session so far.
   [[nodiscard]] PlaceId size() const;

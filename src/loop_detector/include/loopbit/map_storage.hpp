@@ -37,7 +37,8 @@ class MapStorage {
   /// Calls `visit` for each place of earlier sessions, in order.
   virtual void for_each_earlier_place(const Visit& visit) = 0;
 
-  /// Calls `visit` for each loop of earlier sessions, in the order in which they were found.
+  /// Calls `visit` for each loop of earlier sessions that was not rejected, in the order in which
+  /// they were found.
   virtual void for_each_earlier_loop(const VisitLoop& visit) = 0;
 
   /// The features of a place; empty if they are lost. Never null.
@@ -49,6 +50,14 @@ class MapStorage {
   /// if this frame or an earlier one could not be stored.
   virtual void add(const Detection& detection, const BinaryContent& content,
                    std::shared_ptr<const Features> features, const cv::Mat& image) = 0;
+
+  /// Deletes a place and its features. The numbers of the others do not change. Throws Error (kind
+  /// output) if the map cannot be written.
+  virtual void remove(PlaceId place) = 0;
+
+  /// Records that a loop is wrong. Session 0 is this session. Throws Error: kind option if a
+  /// session does not exist, output if the map cannot be written.
+  virtual void reject(const SessionFrame& query, const SessionFrame& match) = 0;
 };
 
 }  // namespace loopbit

@@ -29,6 +29,7 @@ struct MapSession {
   std::string loopbit;      ///< the version that wrote it
   std::string options;      ///< settings of its detector, as to_json() writes them
   std::int64_t frames = 0;  ///< including unreadable ones, which have no place
+  bool linked = false;      ///< compared with all earlier sessions, when recorded or by link_map()
 };
 
 /// A place in a map.
@@ -39,7 +40,7 @@ struct MapPlace {
   BinaryContent content = {};
 };
 
-/// A loop that was found when its query was added.
+/// A loop that was found when its query was added, or by link_map().
 struct MapLoop {
   SessionFrame query;
   SessionFrame match;
@@ -94,6 +95,9 @@ class MapReader : public MapStorage {
   /// The undamaged loops, in the order in which they were found.
   [[nodiscard]] std::vector<MapLoop> loops();
 
+  /// The undamaged loops that LoopDetector::reject() withdrew.
+  [[nodiscard]] std::vector<MapLoop> rejected_loops();
+
   /// None if they are damaged or missing.
   [[nodiscard]] std::optional<Features> features_of(const MapPlace& place);
 
@@ -114,13 +118,15 @@ class MapReader : public MapStorage {
   [[nodiscard]] const std::string& path() const;
 
   void check_options(const LoopDetectorOptions& options) override;
-  /// A reader serves the queries of one LoopDetector. A second one, or add(), throws Error (kind
-  /// option).
+  /// A reader serves the queries of one LoopDetector. A second one, add(), remove() and reject()
+  /// throw Error (kind option).
   void for_each_earlier_place(const Visit& visit) override;
   void for_each_earlier_loop(const VisitLoop& visit) override;
   std::shared_ptr<const Features> features(PlaceId place) override;
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& image) override;
+  void remove(PlaceId place) override;
+  void reject(const SessionFrame& query, const SessionFrame& match) override;
 
  private:
   struct Impl;
@@ -181,6 +187,8 @@ class MapWriter : public MapStorage {
   std::shared_ptr<const Features> features(PlaceId place) override;
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& image) override;
+  void remove(PlaceId place) override;
+  void reject(const SessionFrame& query, const SessionFrame& match) override;
 
  private:
   class Impl;

@@ -1,0 +1,50 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "candidate_filter.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <span>
+#include <utility>
+#include <variant>
+
+namespace loopbit {
+
+void CandidateFilter::remove(PlaceId place) {
+  const auto index = static_cast<std::size_t>(place);
+  if (index >= removed_.size()) removed_.resize(index + 1);
+  removed_[index] = true;
+}
+
+bool CandidateFilter::is_rejected(PlaceId place) const {
+  return std::any_of(rejected_.begin(), rejected_.end(),
+                     [&](const Spot& spot) { return is_same_place(spot, places_.spot_of(place)); });
+}
+
+PlaceTest CandidateFilter::wanted(const AllowedPlaces& allowed) const {
+  if (const auto* asks = std::get_if<std::function<bool(const SessionFrame&)>>(&allowed)) {
+    if (!*asks) return {};
+    return [this, asks](PlaceId place) { return (*asks)(places_.origin(place)); };
+  }
+  const auto* list = std::get_if<std::span<const SessionFrame>>(&allowed);
+  if (list == nullptr) return {};
+  const auto listed = std::make_shared<std::vector<PlaceId>>();  // copies of the test share it
+  for (const SessionFrame& at : *list) {
+    if (const auto place = places_.find(at)) listed->push_back(*place);
+  }
+  std::sort(listed->begin(), listed->end());
+  return
+      [listed](PlaceId place) { return std::binary_search(listed->begin(), listed->end(), place); };
+}
+
+PlaceTest CandidateFilter::test(const AllowedPlaces& allowed, bool changes_view) const {
+  PlaceTest is_wanted = wanted(allowed);
+  const bool has_rejected = !changes_view && !rejected_.empty();
+  if (removed_.empty() && !has_rejected) return is_wanted;
+  return [this, has_rejected, is_wanted = std::move(is_wanted)](PlaceId place) {
+    if (is_removed(place) || (has_rejected && is_rejected(place))) return false;
+    return !is_wanted || is_wanted(place);
+  };
+}
+
+}  // namespace loopbit

@@ -1,0 +1,55 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "loopbit/loop_detector.hpp"
+#include "loopbit/place_index.hpp"
+
+#include "distinctness.hpp"
+
+namespace loopbit {
+
+/// Which places may be candidates: none that was removed, none that a rejected loop of the present
+/// view led to, and none that the caller leaves out.
+class CandidateFilter {
+ public:
+  /// What is known of places.
+  struct Places {
+    std::function<SessionFrame(PlaceId)> origin;  ///< see AllowedPlaces
+    std::function<std::optional<PlaceId>(const SessionFrame&)> find;
+    std::function<Spot(PlaceId)> spot_of;
+  };
+
+  explicit CandidateFilter(Places places) : places_(std::move(places)) {}
+
+  void remove(PlaceId place);
+
+  [[nodiscard]] bool is_removed(PlaceId place) const {
+    const auto index = static_cast<std::size_t>(place);
+    return index < removed_.size() && removed_[index];
+  }
+
+  /// Leaves out what shows the same place as `place` until the view changes.
+  void reject(PlaceId place) { rejected_.push_back(places_.spot_of(place)); }
+
+  void note_change_of_view() { rejected_.clear(); }
+
+  /// For one frame; empty = all places. `changes_view`: the frame shows another view than the ones
+  /// before. Valid as long as `allowed`.
+  [[nodiscard]] PlaceTest test(const AllowedPlaces& allowed, bool changes_view) const;
+
+ private:
+  [[nodiscard]] PlaceTest wanted(const AllowedPlaces& allowed) const;
+  [[nodiscard]] bool is_rejected(PlaceId place) const;
+
+  Places places_;
+  std::vector<bool> removed_;   ///< by place; those beyond are not
+  std::vector<Spot> rejected_;  ///< where the present view is not
+};
+
+}  // namespace loopbit
