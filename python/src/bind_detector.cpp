@@ -49,6 +49,25 @@ struct FreeAndLocked {
   std::scoped_lock<std::recursive_mutex> lock;
 };
 
+/// The same while the detector answers or changes.
+struct Answering : FreeAndLocked {
+  Answering(std::recursive_mutex& mutex, bool& flag) : FreeAndLocked(mutex), is_answering(flag) {
+    if (is_answering) {
+      throw Error(ErrorKind::option,
+                  "The function 'allowed' uses the detector that called it; let it decide by other "
+                  "data.");
+    }
+    is_answering = true;
+  }
+  ~Answering() { is_answering = false; }
+  Answering(const Answering&) = delete;
+  Answering& operator=(const Answering&) = delete;
+  Answering(Answering&&) = delete;
+  Answering& operator=(Answering&&) = delete;
+
+  bool& is_answering;
+};
+
 LoopDetectorOptions options_for(const std::optional<LoopDetectorOptions>& options,
                                 const SharedMap* map) {
   if (options) return *options;
@@ -128,10 +147,12 @@ void bind_ranked_place(py::module_& module) {
 
 /// SharedDetector::query; fills the list if one is given.
 Detection query(const SharedDetector& detector, ImageArgument image,
-                std::optional<double> timestamp_s, std::optional<Ranking> ranking) {
-  if (!ranking) return detector.query(std::move(image), timestamp_s, nullptr);
+                std::optional<double> timestamp_s, std::optional<Ranking> ranking,
+                Evidence* evidence, const AllowedArgument& allowed) {
   std::vector<RankedPlace> places;
-  Detection detection = detector.query(std::move(image), timestamp_s, &places);
+  Detection detection =
+      detector.query(std::move(image), timestamp_s, ranking ? &places : nullptr, evidence, allowed);
+  if (!ranking) return detection;
   ranking->attr("clear")();
   for (const RankedPlace& place : places) ranking->append(place);
   return detection;
@@ -175,13 +196,14 @@ SharedDetector::SharedDetector(const std::optional<LoopDetectorOptions>& options
     : detector_(options_for(options, map.get()), map) {}
 
 Detection SharedDetector::process(ImageArgument image, std::optional<double> timestamp_s,
-                                  Evidence* evidence) {
+                                  Evidence* evidence, const AllowedArgument& allowed) {
   const cv::Mat pixels = to_image(image, "image");
+  const Allowed places(allowed);
   Detection detection;
   Evidence seen;
   {
-    const FreeAndLocked guard(mutex_);
-    detection = detector_.process(pixels, timestamp_s, evidence ? &seen : nullptr);
+    const Answering guard(mutex_, is_answering_);
+    detection = detector_.process(pixels, timestamp_s, evidence ? &seen : nullptr, places.places());
   }
   // With the GIL, because other threads may read it.
   if (evidence) *evidence = std::move(seen);
@@ -189,15 +211,44 @@ Detection SharedDetector::process(ImageArgument image, std::optional<double> tim
 }
 
 Detection SharedDetector::query(ImageArgument image, std::optional<double> timestamp_s,
-                                std::vector<RankedPlace>* ranking) const {
+                                std::vector<RankedPlace>* ranking, Evidence* evidence,
+                                const AllowedArgument& allowed) const {
   const cv::Mat pixels = to_image(image, "image");
-  const FreeAndLocked guard(mutex_);
-  return detector_.query(pixels, timestamp_s, ranking);
+  const Allowed places(allowed);
+  Detection detection;
+  Evidence seen;
+  {
+    const Answering guard(mutex_, is_answering_);
+    detection =
+        detector_.query(pixels, timestamp_s, ranking, evidence ? &seen : nullptr, places.places());
+  }
+  if (evidence) *evidence = std::move(seen);
+  return detection;
 }
 
 Detection SharedDetector::skip(std::optional<double> timestamp_s) {
-  const FreeAndLocked guard(mutex_);
+  const Answering guard(mutex_, is_answering_);
   return detector_.skip(timestamp_s);
+}
+
+void SharedDetector::remove(const PlaceArgument& place) {
+  const SessionFrame removed = to_place(place, "place");
+  const Answering guard(mutex_, is_answering_);
+  detector_.remove(removed);
+}
+
+void SharedDetector::reject(const QueryArgument& query, const std::optional<PlaceArgument>& match) {
+  if (py::isinstance<Detection>(query) && !match) {
+    const Detection loop = query.cast<Detection>();
+    const Answering guard(mutex_, is_answering_);
+    return detector_.reject(loop);
+  }
+  const SessionFrame frame = py::isinstance<Detection>(query)
+                                 ? SessionFrame{0, query.cast<Detection>().frame}
+                                 : to_place(query, "query");
+  const SessionFrame wrong = to_place(match ? py::object(*match) : py::none(), "match");
+  const Answering guard(mutex_, is_answering_);
+  detector_.reject(frame, wrong);
 }
 
 PlaceId SharedDetector::size() const {
@@ -227,16 +278,31 @@ void bind_detector(py::module_& module) {
            "OptionError if the map was made with other settings of binary_content or surf.")
       .def("process", &SharedDetector::process, py::arg("image"),
            py::arg("timestamp_s") = py::none(), py::arg("evidence") = py::none(),
+           py::arg("allowed") = py::none(),
            "Detects a loop, then adds the image as the next place. The image is uint8 or uint16, "
            "(h, w), BGR or BGRA, at least 32 x 32; it is not copied if its rows are contiguous. "
-           "timestamp_s must not go back. If evidence is given, it is filled.")
+           "timestamp_s must not go back. If evidence is given, it is filled. allowed restricts "
+           "the candidates of this frame, for example to those near a position from GPS: a "
+           "function of a SessionFrame that returns whether it may be one, or a sequence of "
+           "places. An int is a frame of this session, which is session 0.")
       .def("query", &query, py::arg("image"), py::arg("timestamp_s") = py::none(),
-           py::arg("ranking") = py::none(),
+           py::arg("ranking") = py::none(), py::arg("evidence") = py::none(),
+           py::arg("allowed") = py::none(),
            "Returns what process() would return, without adding the image. If ranking is given, it "
            "is filled with all candidates, best first, and every candidate is verified, which "
-           "takes longer. Only the first can be a loop.")
+           "takes longer. Only the first can be a loop. evidence and allowed are those of "
+           "process().")
       .def("skip", &SharedDetector::skip, py::arg("timestamp_s") = py::none(),
            "Counts a frame without a usable image, so that frame numbers stay aligned.")
+      .def("remove", &SharedDetector::remove, py::arg("place"),
+           "Removes a place, such as a culled key frame, also from the map. It is never a "
+           "candidate again and affects no answer. Frames keep their numbers. An int is a frame of "
+           "this session.")
+      .def("reject", &SharedDetector::reject, py::arg("query"), py::arg("match") = py::none(),
+           "Withdraws a loop that turned out to be wrong. Its support for later matches ends, and "
+           "frames that show the same view do not match there again. The map records the pair as "
+           "rejected. query is a Detection, whose match is rejected, or a frame with its match. An "
+           "int is a frame of this session.")
       .def("__len__", &SharedDetector::size)
       .def_property_readonly("options", &SharedDetector::options, "A copy of the settings.")
       .def("__repr__", [](const SharedDetector& self) {

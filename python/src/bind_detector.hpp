@@ -10,6 +10,7 @@
 #include "loopbit/loop_detector.hpp"
 
 #include "numpy_image.hpp"
+#include "place_argument.hpp"
 #include "shared_map.hpp"
 
 namespace loopbit::python {
@@ -23,10 +24,15 @@ class SharedDetector {
   SharedDetector(const std::optional<LoopDetectorOptions>& options,
                  const std::shared_ptr<SharedMap>& map);
 
-  Detection process(ImageArgument image, std::optional<double> timestamp_s, Evidence* evidence);
+  Detection process(ImageArgument image, std::optional<double> timestamp_s, Evidence* evidence,
+                    const AllowedArgument& allowed);
+  /// Fills `ranking` and `evidence` unless they are null.
   [[nodiscard]] Detection query(ImageArgument image, std::optional<double> timestamp_s,
-                                std::vector<RankedPlace>* ranking) const;
+                                std::vector<RankedPlace>* ranking, Evidence* evidence,
+                                const AllowedArgument& allowed) const;
   Detection skip(std::optional<double> timestamp_s);
+  void remove(const PlaceArgument& place);
+  void reject(const QueryArgument& query, const std::optional<PlaceArgument>& match);
   [[nodiscard]] PlaceId size() const;
   [[nodiscard]] LoopDetectorOptions options() const;
 
@@ -41,6 +47,7 @@ class SharedDetector {
  private:
   /// Recursive, because a callback during a run may query the detector.
   mutable std::recursive_mutex mutex_;
+  mutable bool is_answering_ = false;  ///< a function `allowed` may then run in the same thread
   LoopDetector detector_;
 };
 

@@ -54,8 +54,7 @@ std::vector<PlaceRow> places_of(MapReader& map) {
   return rows;
 }
 
-std::vector<LoopRow> loops_of(MapReader& map) {
-  const std::vector<MapLoop> loops = map.loops();
+std::vector<LoopRow> rows_of(const std::vector<MapLoop>& loops) {
   std::vector<LoopRow> rows;
   rows.reserve(loops.size());
   for (const MapLoop& loop : loops) {
@@ -64,6 +63,9 @@ std::vector<LoopRow> loops_of(MapReader& map) {
   }
   return rows;
 }
+
+std::vector<LoopRow> loops_of(MapReader& map) { return rows_of(map.loops()); }
+std::vector<LoopRow> rejected_loops_of(MapReader& map) { return rows_of(map.rejected_loops()); }
 
 /// Calls a method of a map that has no parameters.
 template <auto method, typename Map>
@@ -144,6 +146,9 @@ void bind_session(py::module_& module) {
                     "The settings of its detector, as in to_json().")
       .def_readonly("frames", &MapSession::frames,
                     "Number of frames, including unreadable ones, which have no place.")
+      .def_readonly("linked", &MapSession::linked,
+                    "Whether it was compared with all earlier sessions, when it was recorded or by "
+                    "link_map().")
       .def("__repr__", [](const MapSession& self) {
         return fmt::format("MapSession({}, {}, started {}, {} frames)", self.session,
                            literal(py::cast(Text{self.name})), self.started, self.frames);
@@ -177,6 +182,9 @@ void bind_reader(py::module_& module) {
           "All undamaged loops in the order in which they were found: structured array of "
           "query_session, query_frame, match_session, match_frame, score, similarity, matches and "
           "inliers.")
+      .def(
+          "rejected_loops", [](SharedReader& self) { return array_of(self, rejected_loops_of); },
+          "All undamaged loops that LoopDetector.reject() withdrew, in the form of loops().")
       .def("features_of", &features_of, py::arg("place"),
            "The features of a place, which is a row of places(); None if they are damaged.")
       .def("image_of", &image_of, py::arg("place"),

@@ -45,6 +45,14 @@ void bind_results(py::module_& module) {
         return fmt::format("MergeCounts(sessions={}, places={}, loops={}, known={})", self.sessions,
                            self.places, self.loops, self.known);
       });
+  py::class_<LinkCounts>(module, "LinkCounts", "The result of link_map().")
+      .def_readonly("sessions", &LinkCounts::sessions, "Sessions compared with all earlier ones.")
+      .def_readonly("frames", &LinkCounts::frames, "Frames processed.")
+      .def_readonly("loops", &LinkCounts::loops, "Loops found and stored.")
+      .def("__repr__", [](const LinkCounts& self) {
+        return fmt::format("LinkCounts(sessions={}, frames={}, loops={})", self.sessions,
+                           self.frames, self.loops);
+      });
   py::class_<CompactCounts>(module, "CompactCounts", "The result of compact_map().")
       .def_readonly("places_before", &CompactCounts::places_before)
       .def_readonly("places_after", &CompactCounts::places_after)
@@ -75,6 +83,19 @@ void bind_map_tools(py::module_& module) {
       py::arg("into"), py::arg("other"), Free(),
       "Copies the sessions of another map that this one lacks, with their places and loops. Copies "
       "everything or nothing. Creates the map if there is none.");
+  module.def(
+      "link_map",
+      [](const Path& path, const std::optional<LoopDetectorOptions>& options) {
+        return link_map(path.string(), options, [](const LinkCounts& /*counts*/) {
+          check_signals();
+          return true;
+        });
+      },
+      py::arg("path"), py::arg("options") = py::none(), Free(),
+      "Finds the loops between sessions that never met, such as those of merged maps, and adds "
+      "them to the map. Each such session is processed again from its stored contents and "
+      "features, with all earlier sessions as candidates. Without options, uses the settings that "
+      "each session was recorded with. A session is added completely or not at all.");
   module.def(
       "compact_map",
       [](const Path& path, std::vector<int> drop_sessions, std::int64_t max_places,

@@ -1,8 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +20,8 @@
 
 #include "commands.hpp"
 #include "map_output.hpp"
+#include "process.hpp"
+#include "progress.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -47,10 +53,21 @@ std::int64_t sum(const Counts& counts) {
   return sum;
 }
 
+std::int64_t num_unlinked(const MapReader& map) {
+  return std::ranges::count(map.sessions(), false, &MapSession::linked);
+}
+
+void tell_unlinked(const MapReader& map) {
+  if (num_unlinked(map) == 0) return;
+  fmt::print("next       loopbit map link {} finds the loops between sessions that never met\n",
+             printable(map.path()));
+}
+
 void info_command(const std::string& path, bool json) {
   MapReader map(path);
   const std::int64_t places = sum(places_of(map));
   const std::int64_t loops = sum(loops_of(map));
+  const std::size_t rejected = map.rejected_loops().size();
   const MapImages images = map.images();
   const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(path));
   if (json) {
@@ -59,6 +76,8 @@ void info_command(const std::string& path, bool json) {
               {"sessions", map.sessions().size()},
               {"places", places},
               {"loops", loops},
+              {"rejected_loops", rejected},
+              {"unlinked_sessions", num_unlinked(map)},
               {"images", images.number},
               {"image_bytes", images.bytes},
               {"options", nullptr}};
@@ -71,6 +90,7 @@ void info_command(const std::string& path, bool json) {
                  static_cast<double>(bytes) / 1e3 / static_cast<double>(places));
     fmt::print("\nsessions   {}\nplaces     {}\nloops      {}\n", map.sessions().size(), places,
                loops);
+    if (rejected > 0) fmt::print("rejected   {} loops\n", rejected);
     if (images.number > 0) {
       fmt::print("images     {}, {:.1f} MB\n", images.number,
                  static_cast<double>(images.bytes) / 1e6);
@@ -79,6 +99,7 @@ void info_command(const std::string& path, bool json) {
       fmt::print("  {:>9} {} ({}, {} frames)\n", session.session, printable(session.name),
                  session.started, session.frames);
     }
+    tell_unlinked(map);
   }
   warn_of_damage(map);
 }
@@ -100,6 +121,7 @@ void list_command(const std::string& path, bool json) {
                       {"frames", s.frames},
                       {"places", places[s.session]},
                       {"loops", loops[s.session]},
+                      {"linked", s.linked},
                       {"uid", s.uid},
                       {"loopbit", s.loopbit}});
     } else {
@@ -119,6 +141,29 @@ void merge_command(const std::string& into, const std::vector<std::string>& othe
     if (counts.known > 0) fmt::print("; {} sessions were already there", counts.known);
     fmt::print("\n");
   }
+  tell_unlinked(MapReader(into));
+}
+
+int link_command(const std::string& path) {
+  const auto& stop = stop_on_signal();
+  std::optional<Progress> progress;
+  std::int64_t loops = 0;
+  const LinkCounts counts = link_map(path, std::nullopt, [&](const LinkCounts& now) {
+    if (!progress) progress.emplace(static_cast<std::size_t>(now.total_frames));
+    progress->advance(now.loops > loops);
+    loops = now.loops;
+    return !stop;
+  });
+  progress.reset();
+  if (counts.total_frames == 0) {
+    fmt::print("linked     all sessions were compared with the earlier ones before\n");
+    return success;
+  }
+  fmt::print("linked     {} sessions, {} frames: {} new loops\n", counts.sessions, counts.frames,
+             counts.loops);
+  if (counts.frames == counts.total_frames) return success;
+  tell("loopbit: Stopped. What is linked is saved; the same command does the rest.\n");
+  return interrupted;
 }
 
 void export_command(const std::string& path, ExportFormat format, const std::string& out) {
@@ -221,12 +266,17 @@ void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
   check->callback([flags, &exit_code] { exit_code = check_command(flags->map, flags->recover); });
 }
 
-void add_writers(CLI::App& map, const Flags& flags) {
+void add_writers(CLI::App& map, const Flags& flags, int& exit_code) {
   CLI::App* merge = add_command(map, flags, "merge", "Add the sessions of other maps to a map");
   merge
       ->add_option("OTHER", flags->others, "Maps to add; sessions that MAP already has are skipped")
       ->required();
   merge->callback([flags] { merge_command(flags->map, flags->others); });
+
+  CLI::App* link = add_command(map, flags, "link",
+                               "Find the loops between sessions that never met, such as those of "
+                               "merged maps; needs no images");
+  link->callback([flags, &exit_code] { exit_code = link_command(flags->map); });
 
   CLI::App* compact =
       add_command(map, flags, "compact", "Drop sessions, redundant places or images");
@@ -246,10 +296,10 @@ void add_writers(CLI::App& map, const Flags& flags) {
 
 void add_map(CLI::App& app, int& exit_code) {
   auto flags = std::make_shared<MapFlags>();
-  CLI::App* map = app.add_subcommand("map", "Inspect, check, merge and shrink maps");
+  CLI::App* map = app.add_subcommand("map", "Inspect, check, merge, link and shrink maps");
   map->require_subcommand(1);
   add_readers(*map, flags, exit_code);
-  add_writers(*map, flags);
+  add_writers(*map, flags, exit_code);
 }
 
 }  // namespace loopbit::cli
