@@ -79,6 +79,60 @@ TEST_F(MapThreads, ADetectorAddsWhileReadersReadTheFile) {
   EXPECT_EQ(places_of(map_path).size(), std::size_t{2} * kScenes);
 }
 
+/// All threads ask a detector about the same scenes; each must get the answers that one gets.
+void expect_same_answers_in_threads(const LoopDetector& detector) {
+  constexpr int kScenes = 6;
+  constexpr std::size_t kThreads = 4;
+  struct Answer {
+    Detection detection;
+    std::vector<RankedPlace> ranking;
+    Evidence evidence;
+  };
+  const auto ask = [&] {
+    std::vector<Answer> answers(kScenes);
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      Answer& answer = answers[i];
+      const cv::Mat1b image = view(static_cast<int>(i) * 2, {6, 2});
+      answer.detection = detector.query(image, std::nullopt, &answer.ranking, &answer.evidence,
+                                        [](const SessionFrame& place) { return place.frame != 2; });
+    }
+    return answers;
+  };
+  const std::vector<Answer> expected = ask();
+  EXPECT_EQ(expected[3].detection.status, Status::loop);
+  EXPECT_NE(expected[1].detection.status, Status::loop);
+  std::vector<std::vector<Answer>> found(kThreads);
+  std::vector<std::thread> threads;
+  threads.reserve(kThreads);
+  for (auto& answers : found) threads.emplace_back([&] { answers = ask(); });
+  for (std::thread& thread : threads) thread.join();
+  for (const auto& answers : found) {
+    for (std::size_t i = 0; i < answers.size(); ++i) {
+      EXPECT_EQ(answers[i].detection.status, expected[i].detection.status) << i;
+      EXPECT_EQ(answers[i].detection.match, expected[i].detection.match) << i;
+      EXPECT_EQ(answers[i].detection.earlier_match, expected[i].detection.earlier_match) << i;
+      EXPECT_EQ(answers[i].detection.score, expected[i].detection.score) << i;
+      EXPECT_EQ(answers[i].evidence.inliers, expected[i].evidence.inliers) << i;
+      EXPECT_EQ(answers[i].ranking.size(), expected[i].ranking.size()) << i;
+    }
+  }
+}
+
+TEST_F(MapThreads, SeveralThreadsQueryOneDetector) {
+  constexpr int kScenes = 24;
+  {
+    const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+    LoopDetector detector(fast_options(), map);
+    for (int scene = 0; scene < kScenes; ++scene) detector.process(view(scene));
+    detector.remove({0, kScenes - 1});
+    expect_same_answers_in_threads(detector);
+    map->finish();
+  }
+  // A small cache, so that features are read again and again.
+  const auto map = std::make_shared<MapReader>(path("map.db"), 0);
+  expect_same_answers_in_threads(LoopDetector(fast_options(), map));
+}
+
 TEST_F(MapThreads, PendingFeaturesAreGivenWhileTheyAreCommitted) {
   constexpr int kFrames = 400;
   const std::string map_path = path("map.db");

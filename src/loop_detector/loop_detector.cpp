@@ -21,10 +21,10 @@
 #include "agreement.hpp"
 #include "attached_parts.hpp"
 #include "candidate_filter.hpp"
-#include "candidate_verifier.hpp"
 #include "known_loops.hpp"
 #include "place_memory.hpp"
 #include "recent_view.hpp"
+#include "workspace.hpp"
 
 namespace loopbit {
 namespace {
@@ -96,12 +96,7 @@ class LoopDetector::Impl {
                  [this](const SessionFrame& at) { return find(at); },
                  [this](PlaceId place) { return spot_of(place); }}),
         agreement_(options.decision),
-        surf_(options.surf),
-        verifier_(options.verification),
-        candidates_(options_,
-                    {[this](PlaceId place) -> const Features& { return features(place); },
-                     [this](PlaceId place) { return step_of(place); }},
-                    agreement_, known_loops_) {
+        workspaces_([this] { return make_workspace(); }) {
     validate(options);
     memory_.check_options(options);
     PlaceId latest_step = 0;
@@ -127,10 +122,17 @@ class LoopDetector::Impl {
     RecentView::Look look;
     PlaceTest is_allowed;  ///< as a candidate; empty = all places are
     FrameContext context;
-    PlaceId compared = -1;  ///< the recent place that verification_ compares it with
+    PlaceId compared = -1;  ///< the recent place that `work` compares it with
     std::vector<VerifiedCandidate> verified;
     std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
+    Workspaces::Lease work;
   };
+
+  [[nodiscard]] Observation observation() const {
+    Observation seen;
+    seen.work = workspaces_.take();
+    return seen;
+  }
 
   /// The algorithm of Wang et al. 2019, section III.
   Detection detect(const cv::Mat& image, std::optional<double> timestamp_s,
@@ -146,7 +148,7 @@ class LoopDetector::Impl {
     detection.times.content_ms = stopwatch.lap_ms();
 
     // Step 3 begins: features. They also tell how far back the present view reaches.
-    surf_.extract(gray, seen.features);
+    seen.work->surf.extract(gray, seen.features);
     remove_attached_parts(seen);
     detection.times.features_ms = stopwatch.lap_ms();
     recognise(seen, allowed, detection);
@@ -163,7 +165,6 @@ class LoopDetector::Impl {
 
   /// Its second half: finds the place that `seen` shows by its content and features.
   void recognise(Observation& seen, const AllowedPlaces& allowed, Detection& detection) const {
-    memory_.release();
     Stopwatch stopwatch;
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, detection.timestamp_s);
@@ -177,7 +178,7 @@ class LoopDetector::Impl {
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that geometry and the frames before agree on.
-    seen.verified = candidates_.verify(verified_query(seen), candidates);
+    seen.verified = seen.work->candidates.verify(verified_query(seen), candidates);
     decide(seen, end, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
   }
@@ -185,7 +186,7 @@ class LoopDetector::Impl {
   [[nodiscard]] Evidence evidence(const Observation& seen, const Detection& detection) const {
     Evidence evidence{seen.content, seen.saliency, {}};
     if (detection.inliers == 0) return evidence;
-    const Features& place = features(seen.best->candidate.place);
+    const Features& place = features(seen.best->candidate.place, seen);
     const Verification result = verify(seen.features, place, options_.verification);
     evidence.inliers.reserve(result.inliers.size());
     for (const Match& match : result.inliers) {
@@ -197,7 +198,7 @@ class LoopDetector::Impl {
 
   /// How each candidate scored: the answer, and then the others in the order of their rank.
   [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen) const {
-    candidates_.complete(verified_query(seen), seen.verified);
+    seen.work->candidates.complete(verified_query(seen), seen.verified);
     if (seen.best) {
       std::erase_if(seen.verified, [&](const VerifiedCandidate& v) {
         return v.candidate.place == seen.best->candidate.place;
@@ -280,7 +281,15 @@ class LoopDetector::Impl {
   [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
 
  private:
-  [[nodiscard]] const Features& features(PlaceId place) const { return memory_.features(place); }
+  [[nodiscard]] std::unique_ptr<Workspace> make_workspace() const {
+    return std::make_unique<Workspace>(
+        options_, memory_, [this](PlaceId place) { return step_of(place); }, agreement_,
+        known_loops_);
+  }
+
+  [[nodiscard]] const Features& features(PlaceId place, const Observation& seen) const {
+    return memory_.features(place, seen.work->held);
+  }
 
   /// See RankedPlace::place.
   [[nodiscard]] SessionFrame origin(PlaceId place) const {
@@ -375,7 +384,7 @@ class LoopDetector::Impl {
     return recent_view_.look(index_.size(), is_step, [&](PlaceId place) {
       if (is_window_fixed()) return true;
       const Verification& shared = compare(seen, place);
-      return moved_inliers(seen.features, features(place), shared.inliers) >=
+      return moved_inliers(seen.features, features(place, seen), shared.inliers) >=
              options_.exclusion.in_view_inliers;
     });
   }
@@ -389,13 +398,14 @@ class LoopDetector::Impl {
 
   /// What a frame shares with a recent place.
   const Verification& compare(Observation& seen, PlaceId place) const {
+    Workspace& work = *seen.work;
     if (seen.compared != place) {
-      const Features& recent = features(place);
-      verifier_.match(seen.features, recent, verification_);
-      verifier_.find_geometry(seen.features, recent, verification_);
+      const Features& recent = features(place, seen);
+      work.verifier.match(seen.features, recent, work.verification);
+      work.verifier.find_geometry(seen.features, recent, work.verification);
       seen.compared = place;
     }
-    return verification_;
+    return work.verification;
   }
 
   [[nodiscard]] bool is_window_fixed() const {
@@ -475,9 +485,9 @@ class LoopDetector::Impl {
                                           PlaceId end) const {
     const CandidateVerifier::Query query = verified_query(seen);
     const int radius = options_.retrieval.min_spacing;
-    const VerifiedCandidate closest = candidates_.closest(
+    const VerifiedCandidate closest = seen.work->candidates.closest(
         query, best, seen.verified, candidates_around(best.candidate.place, radius, end, seen));
-    return candidates_.located(
+    return seen.work->candidates.located(
         query, closest, seen.verified,
         candidates_around(closest.candidate.place, radius + CandidateVerifier::kReach, end, seen));
   }
@@ -525,11 +535,7 @@ class LoopDetector::Impl {
   int latest_view_inliers_ = 0;  ///< see FrameContext
   Agreement agreement_;
   KnownLoops known_loops_;
-  // Working memory, which makes const functions unfit for threads.
-  mutable SurfExtractor surf_;
-  mutable Verifier verifier_;
-  mutable Verification verification_;  ///< of the query and a recent place
-  mutable CandidateVerifier candidates_;
+  mutable Workspaces workspaces_;
 };
 
 LoopDetector::LoopDetector(const LoopDetectorOptions& options) : LoopDetector(options, nullptr) {}
@@ -541,7 +547,7 @@ LoopDetector& LoopDetector::operator=(LoopDetector&&) noexcept = default;
 
 Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s,
                                 Evidence* evidence, const AllowedPlaces& allowed) {
-  Impl::Observation seen;
+  Impl::Observation seen = impl_->observation();
   Detection detection = impl_->detect(image, timestamp_s, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
   impl_->remember(std::move(seen), detection, image);
@@ -550,7 +556,7 @@ Detection LoopDetector::process(const cv::Mat& image, std::optional<double> time
 
 Detection LoopDetector::process(const BinaryContent& content, Features features,
                                 std::optional<double> timestamp_s) {
-  Impl::Observation seen;
+  Impl::Observation seen = impl_->observation();
   seen.content = content;
   seen.features = std::move(features);
   const Detection detection = impl_->detect(timestamp_s, seen);
@@ -561,7 +567,7 @@ Detection LoopDetector::process(const BinaryContent& content, Features features,
 Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timestamp_s,
                               std::vector<RankedPlace>* ranking, Evidence* evidence,
                               const AllowedPlaces& allowed) const {
-  Impl::Observation seen;
+  Impl::Observation seen = impl_->observation();
   Detection detection = impl_->detect(image, timestamp_s, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
   if (ranking) *ranking = impl_->ranked(seen);

@@ -49,7 +49,8 @@ void PlaceMemory::add(const Detection& detection, const BinaryContent& content, 
 }
 
 void PlaceMemory::remove(PlaceId place, bool is_in_view) {
-  if (is_in_view) removed_[place] = std::make_shared<const Features>(features(place));
+  Held held;
+  if (is_in_view) removed_[place] = std::make_shared<const Features>(features(place, held));
   try {
     if (map_) map_->remove(place);
   } catch (...) {
@@ -59,14 +60,15 @@ void PlaceMemory::remove(PlaceId place, bool is_in_view) {
   if (!map_) features_[static_cast<std::size_t>(place)] = {};
 }
 
-const Features& PlaceMemory::features(PlaceId place) const {
+const Features& PlaceMemory::features(PlaceId place, Held& held) const {
   if (!removed_.empty()) {
     const auto found = removed_.find(place);
     if (found != removed_.end()) return *found->second;
   }
   if (!map_) return features_[static_cast<std::size_t>(place)];
-  held_.push_back(map_->features(place));
-  return *held_.back();
+  const std::scoped_lock lock(map_mutex_);
+  held.push_back(map_->features(place));
+  return *held.back();
 }
 
 }  // namespace loopbit

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -17,6 +18,9 @@ namespace loopbit {
 /// map, and for those of earlier sessions where they came from.
 class PlaceMemory {
  public:
+  /// Keeps features valid that were read from a map.
+  using Held = std::vector<std::shared_ptr<const Features>>;
+
   /// `map`: null = all in memory.
   explicit PlaceMemory(std::shared_ptr<MapStorage> map) : map_(std::move(map)) {}
 
@@ -82,11 +86,8 @@ class PlaceMemory {
   /// The place of an earlier session's frame, if the map still has it.
   [[nodiscard]] std::optional<PlaceId> find(const SessionFrame& origin) const;
 
-  /// Valid until release().
-  [[nodiscard]] const Features& features(PlaceId place) const;
-
-  /// Lets go of what features() gave.
-  void release() const { held_.clear(); }
+  /// Valid as long as `held`. Several threads may ask at once.
+  [[nodiscard]] const Features& features(PlaceId place, Held& held) const;
 
  private:
   struct EarlierPlace {
@@ -101,7 +102,7 @@ class PlaceMemory {
   std::ptrdiff_t earlier_steps_ = 0;
   std::vector<Features> features_;                              ///< without a map: of each place
   std::map<PlaceId, std::shared_ptr<const Features>> removed_;  ///< those still in view
-  mutable std::vector<std::shared_ptr<const Features>> held_;
+  mutable std::mutex map_mutex_;  ///< a map serves one thread at a time
 };
 
 }  // namespace loopbit

@@ -31,11 +31,15 @@ using AllowedPlaces = std::variant<std::monostate, std::function<bool(const Sess
 /// H. Wang, J. Li, M. Ran, L. Xie, "Fast Loop Closure Detection via Binary Content", 2019. Binary
 /// content finds similar earlier places, SURF features and epipolar geometry verify them, and
 /// agreement with the previous frames supports the decision. The same images give the same answers
-/// on any processor. Not thread-safe; use one detector per thread.
+/// on any processor.
+///
+/// Several threads may call const functions at once, such as query(). Other functions need the
+/// detector for themselves, so lock a std::shared_mutex: shared for query(), exclusive for
+/// process(). A MapStorage is asked by one thread at a time.
 ///
 /// Memory: at most 50 KB per place by default, nearly all of it features, plus working memory that
-/// is reused for every frame. With a map, the map stores the features, and 700 bytes per place
-/// remain.
+/// is reused for every frame, for each thread that queries at the same time. With a map, the map
+/// stores the features, and 700 bytes per place remain.
 class LoopDetector {
  public:
   /// Throws Error (kind option) if `options` are not valid.
