@@ -4,6 +4,7 @@
 """Maps as a user meets them: loopbit run --map, query and map."""
 
 import concurrent.futures
+import csv
 import json
 import os
 import pathlib
@@ -65,7 +66,8 @@ class MapCommandTest(CommandTest):
             "image": "SELECT image, session, frame, i.checksum FROM image AS i "
                      "JOIN place USING (place)",
             "loop": "SELECT session, frame, match_session, match_frame, score, similarity, "
-                    "matches, inliers, checksum FROM loop"}
+                    "matches, inliers, checksum FROM loop",
+            "linked": "SELECT session, checksum FROM linked"}
         encoders = {int: lambda value: struct.pack("<q", value), str: str.encode,
                     float: lambda value: struct.pack("<d", value), bytes: bytes}
         for path, table in [*((town, table) for table in queries), (self.map, "loop")]:
@@ -387,6 +389,62 @@ class MapCommandTest(CommandTest):
         self.assertEqual([s["session"] for s in sessions], [2])
         self.assert_fails(loopbit("map", "compact", merged), 2, "--drop", "--budget")
         self.assert_fails(loopbit("map", "compact", merged, "--drop", 9), 2, "session 9")
+
+    def test_link_finds_the_loops_between_merged_maps(self):
+        first, second, met = (self.scratch / name for name in ("first.db", "second.db", "met.db"))
+        for images, maps in ((self.laps[0], (first, met)), (self.laps[1], (second, met))):
+            for map in maps:
+                ran = loopbit("run", images, "--map", map, "--no-report")
+                self.assertEqual(ran.returncode, 0, ran.stderr)
+
+        def loops(map):
+            rows = csv.DictReader(loopbit("map", "export", map).stdout.splitlines())
+            return [row for row in rows if row["query_session"] != row["match_session"]]
+
+        merged = loopbit("map", "merge", first, second)
+        self.assertIn(f"next       loopbit map link {first}", merged.stdout)
+        self.assertIn(f"loopbit map link {first}", loopbit("map", "info", first).stdout)
+        self.assertEqual(loops(first), [])
+        linked = loopbit("map", "link", first)
+        self.assertEqual(linked.returncode, 0, linked.stderr)
+        self.assertGreater(len(loops(met)), LAP // 2)
+        self.assertEqual(loops(first), loops(met))
+        self.assertIn(f"1 sessions, {LAP} places: {len(loops(met))} new loops", linked.stdout)
+        before = first.read_bytes()
+        again = loopbit("map", "link", first)
+        self.assertIn("all sessions were compared", again.stdout)
+        self.assertEqual(first.read_bytes(), before)
+        self.assertEqual([s["linked"] for s in json.loads(
+            loopbit("map", "list", first, "--json").stdout)], [True, True])
+        info = json.loads(loopbit("map", "info", first, "--json").stdout)
+        self.assertEqual((info["unlinked_sessions"], info["rejected_loops"]), (0, 0))
+
+    def test_a_link_that_is_interrupted_or_killed_leaves_the_map_whole(self):
+        merged, other, copy = (self.scratch / name for name in ("m.db", "other.db", "copy.db"))
+        for map, images in ((merged, self.laps[0]), (other, self.laps[1])):
+            loopbit("run", images, "--map", map, "--no-report")
+        loopbit("map", "merge", merged, other)
+        before = merged.read_bytes()
+        ended = set()
+        for attempt in range(40):    # some come before it begins, or after its end
+            shutil.copy(merged, copy)
+            with subprocess.Popen([LOOPBIT, "map", "link", copy], stdout=subprocess.PIPE,
+                                  stderr=subprocess.PIPE, text=True) as link:
+                time.sleep(0.02 * (attempt // 2 % 10 + 1))
+                link.send_signal(signal.SIGKILL if attempt % 2 else signal.SIGINT)
+                out, err = link.communicate()
+            ended.add(link.returncode)
+            if link.returncode == 130:
+                self.assertIn("the same command does the rest", err)
+                self.assertIn("0 sessions", out)
+                self.assertEqual(copy.read_bytes(), before)
+            self.assertEqual(loopbit("map", "check", copy).returncode, 0)
+            for log in self.scratch.glob("copy.db-*"):
+                log.unlink()
+            if ended >= {130, -signal.SIGKILL} and attempt >= 10:
+                break
+        self.assertGreaterEqual(ended, {130, -signal.SIGKILL})
+        self.assertIn("1 sessions", loopbit("map", "link", merged).stdout)
 
     def test_damage_is_listed_recovered_and_never_written_to(self):
         copy = self.copy_of_map()

@@ -8,6 +8,7 @@
 
 #include <gtest/gtest.h>
 
+#include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_tools.hpp"
 
@@ -19,6 +20,7 @@ namespace loopbit::test {
 namespace {
 
 constexpr int kScenes = 16;
+constexpr int kReadable = kScenes * 3 / 2 - 2;  ///< frames of a drive
 
 /// As a map of version 2: without its last tables.
 constexpr const char* kAsVersion2 =
@@ -43,7 +45,7 @@ class MapLink : public ScratchTest {
   /// Two sessions that never met, in merged.db.
   void merge_two() const {
     drive("first.db", {0, 0});
-    drive("second.db", {6, 2}, 3);
+    drive("second.db", {6, 2}, 2);
     merge_map(path("merged.db"), path("first.db"));
     merge_map(path("merged.db"), path("second.db"));
   }
@@ -61,10 +63,10 @@ TEST_F(MapLink, FindsTheLoopsThatARunOnTheMapFinds) {
   const std::size_t within = MapReader(path("merged.db")).loops().size();
   const LinkCounts counts = link_map(path("merged.db"));
   EXPECT_EQ(counts.sessions, 1);
-  EXPECT_EQ(counts.frames, kScenes * 3 / 2);
-  EXPECT_EQ(counts.total_frames, counts.frames);
+  EXPECT_EQ(counts.places, kReadable);
+  EXPECT_EQ(counts.total_places, counts.places);
 
-  drive("first.db", {6, 2}, 3);  // on the map of the first one
+  drive("first.db", {6, 2}, 2);  // on the map of the first one
   const std::vector<MapLoop> expected = loops_between("first.db");
   EXPECT_GT(expected.size(), std::size_t{kScenes});
   EXPECT_EQ(loops_between("merged.db"), expected);
@@ -80,7 +82,7 @@ TEST_F(MapLink, ASecondTimeChangesNoByte) {
   EXPECT_TRUE(is_one_file(path("merged.db")));
   const std::string bytes = read_bytes(path("merged.db"));
   const LinkCounts again = link_map(path("merged.db"));
-  EXPECT_EQ(again.sessions + again.frames + again.total_frames + again.loops, 0);
+  EXPECT_EQ(again.sessions + again.places + again.total_places + again.loops, 0);
   EXPECT_EQ(read_bytes(path("merged.db")), bytes);
 }
 
@@ -90,7 +92,7 @@ TEST_F(MapLink, SessionsOfARunAreLinkedAlready) {
   const MapReader map(path("map.db"));
   EXPECT_TRUE(map.sessions()[0].linked);
   EXPECT_TRUE(map.sessions()[1].linked);
-  EXPECT_EQ(link_map(path("map.db")).total_frames, 0);
+  EXPECT_EQ(link_map(path("map.db")).total_places, 0);
 }
 
 TEST_F(MapLink, WhatIsKnownOrRejectedIsNotFoundAgain) {
@@ -116,12 +118,12 @@ TEST_F(MapLink, AStopKeepsTheSessionsThatAreDone) {
   drive("third.db", {3, 1});
   merge_map(path("merged.db"), path("third.db"));
   const auto stops_at = [](std::int64_t frame) {
-    return [frame](const LinkCounts& counts) { return counts.frames < frame; };
+    return [frame](const LinkCounts& counts) { return counts.places < frame; };
   };
   const std::string bytes = read_bytes(path("merged.db"));
   const LinkCounts none = link_map(path("merged.db"), {}, stops_at(kScenes));
-  EXPECT_EQ(none.sessions + none.loops + none.frames, 0);
-  EXPECT_EQ(none.total_frames, 2 * kScenes * 3 / 2);
+  EXPECT_EQ(none.sessions + none.loops + none.places, 0);
+  EXPECT_EQ(none.total_places, 2 * kReadable);
   EXPECT_EQ(read_bytes(path("merged.db")), bytes);
 
   const LinkCounts one = link_map(path("merged.db"), {}, stops_at(kScenes * 5 / 2));
@@ -129,7 +131,7 @@ TEST_F(MapLink, AStopKeepsTheSessionsThatAreDone) {
   EXPECT_EQ(one.loops, std::ssize(loops_between("merged.db")));
   const LinkCounts rest = link_map(path("merged.db"));
   EXPECT_EQ(rest.sessions, 1);
-  EXPECT_EQ(rest.total_frames, kScenes * 3 / 2);
+  EXPECT_EQ(rest.total_places, kReadable);
   EXPECT_GT(rest.loops, 0);
   EXPECT_EQ(one.loops + rest.loops, std::ssize(loops_between("merged.db")));
 }
@@ -172,6 +174,31 @@ TEST_F(MapLink, NeedsAMapThatNobodyWrites) {
   expect_error(ErrorKind::input, {"no map", "none.db"}, [&] { link_map(path("none.db")); });
   const MapWriter map(path("map.db"), fast_options(), "drive");
   expect_error(ErrorKind::output, {"map.db", "being written"}, [&] { link_map(path("map.db")); });
+}
+
+using RealMapLink = MapLink;
+
+TEST_F(RealMapLink, TwoWalksThroughACorridor) {
+  LOOPBIT_NEEDS_DATA("corridor_loop");
+  const auto walk = [&](const std::string& name, int first, int last) {
+    const auto source = open_source((*data_dir() / "corridor_loop/images").string());
+    const auto map = std::make_shared<MapWriter>(path(name), LoopDetectorOptions{}, name);
+    LoopDetector detector(LoopDetectorOptions{}, map);
+    Frame frame;
+    for (int i = 0; i <= last && source->next(frame); ++i) {
+      if (i >= first) detector.process(frame.image);
+    }
+    map->finish();
+  };
+  walk("first.db", 0, 41);
+  walk("second.db", 42, 83);
+  merge_map(path("merged.db"), path("first.db"));
+  merge_map(path("merged.db"), path("second.db"));
+  EXPECT_EQ(link_map(path("merged.db")).places, 42);
+  walk("first.db", 42, 83);
+  const std::vector<MapLoop> expected = loops_between("first.db");
+  EXPECT_GT(expected.size(), 35U);
+  EXPECT_EQ(loops_between("merged.db"), expected);
 }
 
 }  // namespace

@@ -67,7 +67,9 @@ TEST_F(MapTools, RejectedLoopsAndLinksAreCopied) {
   const std::vector<MapLoop> rejected = MapReader(path("b.db")).rejected_loops();
   ASSERT_EQ(rejected.size(), 2U);
   merge_map(path("copy.db"), path("b.db"));
-  compact_map(path("b.db"), {.max_places = 8});
+  CompactOptions options;
+  options.max_places = 8;
+  compact_map(path("b.db"), options);
   recover_map(path("b.db"), path("recovered.db"));
   for (const char* name : {"b.db", "copy.db", "recovered.db"}) {
     MapReader map(path(name));

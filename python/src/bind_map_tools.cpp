@@ -47,11 +47,12 @@ void bind_results(py::module_& module) {
       });
   py::class_<LinkCounts>(module, "LinkCounts", "The result of link_map().")
       .def_readonly("sessions", &LinkCounts::sessions, "Sessions compared with all earlier ones.")
-      .def_readonly("frames", &LinkCounts::frames, "Frames processed.")
+      .def_readonly("places", &LinkCounts::places,
+                    "Places of these sessions, which were processed.")
       .def_readonly("loops", &LinkCounts::loops, "Loops found and stored.")
       .def("__repr__", [](const LinkCounts& self) {
-        return fmt::format("LinkCounts(sessions={}, frames={}, loops={})", self.sessions,
-                           self.frames, self.loops);
+        return fmt::format("LinkCounts(sessions={}, places={}, loops={})", self.sessions,
+                           self.places, self.loops);
       });
   py::class_<CompactCounts>(module, "CompactCounts", "The result of compact_map().")
       .def_readonly("places_before", &CompactCounts::places_before)

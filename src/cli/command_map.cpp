@@ -149,19 +149,19 @@ int link_command(const std::string& path) {
   std::optional<Progress> progress;
   std::int64_t loops = 0;
   const LinkCounts counts = link_map(path, std::nullopt, [&](const LinkCounts& now) {
-    if (!progress) progress.emplace(static_cast<std::size_t>(now.total_frames));
+    if (!progress) progress.emplace(static_cast<std::size_t>(now.total_places));
     progress->advance(now.loops > loops);
     loops = now.loops;
     return !stop;
   });
   progress.reset();
-  if (counts.total_frames == 0) {
+  if (counts.total_places == 0) {
     fmt::print("linked     all sessions were compared with the earlier ones before\n");
     return success;
   }
-  fmt::print("linked     {} sessions, {} frames: {} new loops\n", counts.sessions, counts.frames,
+  fmt::print("linked     {} sessions, {} places: {} new loops\n", counts.sessions, counts.places,
              counts.loops);
-  if (counts.frames == counts.total_frames) return success;
+  if (counts.places == counts.total_places) return success;
   tell("loopbit: Stopped. What is linked is saved; the same command does the rest.\n");
   return interrupted;
 }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <set>
 #include <string>
@@ -25,6 +26,23 @@
 namespace loopbit {
 namespace {
 
+/// Longer stretches without a place are as good as this one: no setting of use reaches further.
+constexpr std::int64_t kMaxSkipped = 1000;
+
+/// The places of a session in order of frame.
+std::vector<MapPlace> places_of(const Database& database, int session, Damage& damage) {
+  std::vector<MapPlace> places;
+  for_each_place(
+      database,
+      [&](const MapPlace& place) {
+        if (place.at.session == session) places.push_back(place);
+      },
+      damage);
+  const auto frame = [](const MapPlace& place) { return place.at.frame; };
+  std::ranges::stable_sort(places, {}, frame);
+  return places;
+}
+
 /// A map as it was for the detector of one of its sessions, whose frames are processed again.
 class MapBefore : public MapStorage {
  public:
@@ -32,18 +50,15 @@ class MapBefore : public MapStorage {
       : path_(std::move(path)),
         database_(database),
         session_(session),
-        reader_(database),
         stored_(database, kMapCache_mb) {}
 
   void check_options(const LoopDetectorOptions& /*options*/) override {}  // link_map() does
 
-  /// Keeps the places of the session for later.
   void for_each_earlier_place(const Visit& visit) override {
     stored_.begin(path_);
     for_each_place(
         database_,
         [&](const MapPlace& place) {
-          if (place.at.session == session_) own_.push_back(place);
           if (place.at.session >= session_) return;
           stored_.add(place.id, place.at);
           visit(place.at, place.content);
@@ -61,29 +76,18 @@ class MapBefore : public MapStorage {
     return stored_.get(place, damage_);
   }
 
-  void add(const Detection& detection, const BinaryContent& /*content*/,
+  /// The place that is processed next; null if the next frame has none.
+  void announce(const MapPlace* place) { next_ = place; }
+
+  void add(const Detection& /*detection*/, const BinaryContent& /*content*/,
            std::shared_ptr<const Features> features, const cv::Mat& /*image*/) override {
-    const MapPlace* place = own_place(detection.frame);
     const PlaceId number = stored_.size();
-    stored_.add(place ? place->id : StoredFeatures::kNoRow, {session_, detection.frame});
+    stored_.add(next_ ? next_->id : StoredFeatures::kNoRow, next_ ? next_->at : SessionFrame{});
     stored_.keep(number, std::move(features));
   }
 
   void remove(PlaceId /*place*/) override {}                                             // unused
   void reject(const SessionFrame& /*query*/, const SessionFrame& /*match*/) override {}  // known
-
-  /// The place of a frame of the session; null if it has none.
-  [[nodiscard]] const MapPlace* own_place(int frame) const {
-    const auto found =
-        std::lower_bound(own_.begin(), own_.end(), frame,
-                         [](const MapPlace& place, int number) { return place.at.frame < number; });
-    return found != own_.end() && found->at.frame == frame ? &*found : nullptr;
-  }
-
-  /// The features that the map has of it.
-  [[nodiscard]] std::optional<Features> stored_features(const MapPlace& place) {
-    return reader_.read(place.id, place.at, damage_);
-  }
 
   [[nodiscard]] Damage& damage() { return damage_; }
 
@@ -91,9 +95,8 @@ class MapBefore : public MapStorage {
   std::string path_;
   const Database& database_;
   int session_;
-  FeatureReader reader_;
   StoredFeatures stored_;
-  std::vector<MapPlace> own_;
+  const MapPlace* next_ = nullptr;
   Damage damage_;
 };
 
@@ -114,32 +117,73 @@ class FramePairs {
   std::set<std::pair<int, int>> pairs_;
 };
 
-/// Processes the frames of a session again. `progress(is_new_loop)` is called for each; if it
-/// returns false, there is no answer.
+/// Processes the frames of a session again.
+class Relived {
+ public:
+  /// `database` must outlive it.
+  Relived(const std::string& path, const Database& database, int session,
+          const LoopDetectorOptions& options)
+      : path_(path),
+        session_(session),
+        map_(std::make_shared<MapBefore>(path, database, session)),
+        reader_(database),
+        known_(read_loops(database, map_->damage()), session),
+        rejected_(read_rejected_loops(database, map_->damage()), session),
+        detector_(options, map_) {}
+
+  /// The next place, and whether it has a loop that the map does not have.
+  std::optional<MapLoop> process(const MapPlace& place) {
+    skip_to(place.at.frame);
+    auto features = reader_.read(place.id, place.at, map_->damage());
+    refuse_damaged(path_, map_->damage().clauses());
+    map_->announce(&place);
+    Detection detection = detector_.process(place.content, std::move(*features), place.timestamp_s);
+    refuse_damaged(path_, map_->damage().clauses());
+    if (detection.status != Status::loop) return std::nullopt;
+    MapLoop loop = loop_of(detection, session_);
+    loop.query.frame = place.at.frame;
+    if (rejected_.contain(loop)) {
+      detector_.reject(detection);
+      return std::nullopt;
+    }
+    if (!detection.earlier_match || known_.contain(loop)) return std::nullopt;
+    return loop;
+  }
+
+ private:
+  /// Frames without a place were unreadable, or their places were dropped.
+  void skip_to(std::int64_t frame) {
+    map_->announce(nullptr);
+    for (auto i = std::max(next_frame_, frame - kMaxSkipped); i < frame; ++i) detector_.skip();
+    next_frame_ = frame + 1;
+  }
+
+  std::string path_;
+  int session_;
+  std::shared_ptr<MapBefore> map_;
+  FeatureReader reader_;
+  FramePairs known_;
+  FramePairs rejected_;
+  LoopDetector detector_;
+  std::int64_t next_frame_ = 0;
+};
+
+/// The loops of a session that the map does not have. `progress(is_new_loop)` is called for each
+/// place; if it returns false, there is no answer.
 template <typename Progress>
 std::optional<std::vector<MapLoop>> new_loops_of(const MapSession& session, const std::string& path,
                                                  const LoopDetectorOptions& options,
                                                  const Progress& progress) {
   const Database database = open_map_for_reading(path);
-  const auto before = std::make_shared<MapBefore>(path, database, session.session);
-  const FramePairs known(read_loops(database, before->damage()), session.session);
-  const FramePairs rejected(read_rejected_loops(database, before->damage()), session.session);
-  LoopDetector detector(options, before);
+  Relived relived(path, database, session.session, options);
+  Damage damage;
+  const std::vector<MapPlace> places = places_of(database, session.session, damage);
+  refuse_damaged(path, damage.clauses());
   std::vector<MapLoop> found;
-  while (detector.size() < session.frames) {
-    const MapPlace* place = before->own_place(detector.size());
-    auto features = place ? before->stored_features(*place) : std::nullopt;
-    const Detection detection =
-        features ? detector.process(place->content, std::move(*features), place->timestamp_s)
-                 : detector.skip();
-    refuse_damaged(path, before->damage().clauses());
-    const MapLoop loop = loop_of(detection, session.session);
-    const bool is_rejected = detection.status == Status::loop && rejected.contain(loop);
-    if (is_rejected) detector.reject(detection);
-    const bool is_new = detection.status == Status::loop && detection.earlier_match &&
-                        !is_rejected && !known.contain(loop);
-    if (is_new) found.push_back(loop);
-    if (!progress(is_new)) return std::nullopt;
+  for (const MapPlace& place : places) {
+    const std::optional<MapLoop> loop = relived.process(place);
+    if (loop) found.push_back(*loop);
+    if (!progress(loop.has_value())) return std::nullopt;
   }
   return found;
 }
@@ -173,16 +217,25 @@ std::vector<MapSession> unlinked_sessions(const std::string& path, const Databas
   return sessions;
 }
 
+std::int64_t num_places(const Database& database, const std::vector<MapSession>& sessions) {
+  std::int64_t number = 0;
+  for (const MapSession& session : sessions) {
+    number += database.integer(
+        fmt::format("SELECT count(*) FROM place WHERE session = {}", session.session));
+  }
+  return number;
+}
+
 LinkCounts link(const std::string& path, const Database& database,
                 const std::optional<LoopDetectorOptions>& options,
                 const std::function<bool(const LinkCounts&)>& progress) {
   const std::vector<MapSession> sessions = unlinked_sessions(path, database, options);
   LinkCounts counts;
-  for (const MapSession& session : sessions) counts.total_frames += session.frames;
+  counts.total_places = num_places(database, sessions);
   for (const MapSession& session : sessions) {
     const LinkCounts before = counts;
     const auto advance = [&](bool is_new) {
-      ++counts.frames;
+      ++counts.places;
       counts.loops += is_new;
       return !progress || progress(counts);
     };

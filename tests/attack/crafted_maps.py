@@ -52,6 +52,10 @@ STATEMENTS = {
     "text_score": "UPDATE loop SET score = 'nan'",
     "loop_to_nowhere": "UPDATE loop SET match_session = 99, match_frame = -1",
     "loop_to_itself": "UPDATE loop SET match_session = session, match_frame = frame",
+    "unlinked": "DELETE FROM linked",
+    "far_frames": "DELETE FROM linked; UPDATE place SET frame = frame + 2147483000",
+    "linked_to_nowhere": "UPDATE linked SET session = session + 70",
+    "rejected_anew": "DELETE FROM linked; INSERT INTO rejected SELECT * FROM loop",
     "text_image": "UPDATE image SET image = 'no jpeg'",
     "small_pages": "PRAGMA journal_mode = DELETE; PRAGMA page_size = 512; VACUUM",
     "other_journal": "PRAGMA journal_mode = DELETE",
@@ -74,7 +78,10 @@ def sign(database):
     values = {"session": "session, frames, uid, name, started, loopbit, options",
               "place": "session, frame, timestamp, content",
               "loop": "session, frame, match_session, match_frame, score, similarity, matches, "
-                      "inliers"}
+                      "inliers",
+              "rejected": "match_session, match_frame, session, frame, score, similarity, matches, "
+                          "inliers",
+              "linked": "session"}
     for table, names in values.items():
         database.execute(f"UPDATE {table} SET checksum = crc({names})")
     for table, names in {"features": "p.session, p.frame, features",

@@ -114,14 +114,14 @@ def use_map(case, path, signed=False):
         case.expect(answers(case, path) == answers(case, case.material.map),
                     "map check finds nothing, and the answers are others")
     new, images = case.folder / "new.db", case.material.images
-    kind = case.random.choice(["recover", "run", "query", "merge", "compact", "images", "info",
-                               "list", "export"])
+    kind = case.random.choice(["recover", "run", "query", "merge", "link", "compact", "images",
+                               "info", "list", "export"])
     if kind == "recover":
         recover(case, path, new, signed)
-    elif kind in ("run", "compact", "merge"):
+    elif kind in ("run", "compact", "merge", "link"):
         command = {"run": ["run", images, "--limit", 2, "--map", path, "--out",
                            case.folder / "out", "--no-report"],
-                   "compact": ["map", "compact", path, "--drop", 1],
+                   "compact": ["map", "compact", path, "--drop", 1], "link": ["map", "link", path],
                    "merge": case.random.choice([["map", "merge", path, case.material.other_map],
                                                 ["map", "merge", new, path]])}[kind]
         # Of a writer that was killed, a run first takes the log into the map.

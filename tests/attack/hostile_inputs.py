@@ -60,7 +60,7 @@ def places_of_a_file(case, special):
         "asked_map": ["query", special, image], "checked": ["map", "check", special],
         "info": ["map", "info", special], "exported": ["map", "export", special],
         "merged": ["map", "merge", out, special], "into": ["map", "merge", special, material.map],
-        "compacted": ["map", "compact", special, "--drop", 1],
+        "compacted": ["map", "compact", special, "--drop", 1], "linked": ["map", "link", special],
         "recovered": ["map", "check", material.map, "--recover", special],
         "export": ["map", "export", material.map, "--out", special],
         "images": ["map", "images", material.map, "--out", special],

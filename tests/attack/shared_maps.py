@@ -91,7 +91,7 @@ def two_names(case):
     before = [contents(file) for file in (path, log_of(path))]  # readers share the rest
     for command in (["run", case.material.images, "--limit", 2, "--map", other, "--out",
                      case.folder / "out", "--no-report"],
-                    ["map", "merge", other, case.material.other_map],
+                    ["map", "merge", other, case.material.other_map], ["map", "link", other],
                     ["map", "compact", other, "--drop", 1]):
         if case.about == "bind_mount":
             ran = case.finish(case.start(
@@ -146,7 +146,7 @@ def foreign_journal(case):
     shutil.copy(case.folder / "other.db-journal", target)
     for command in (["map", "check", path], ["map", "export", path],
                     ["query", path, case.material.images / "000001.png", "--json"],
-                    ["map", "merge", path, case.material.other_map],
+                    ["map", "merge", path, case.material.other_map], ["map", "link", path],
                     ["map", "compact", path, "--drop", 1],
                     ["run", case.material.images, "--limit", 2, "--map", path, "--out",
                      case.folder / "out", "--no-report"]):

@@ -60,6 +60,50 @@ def test_detection(images):
     assert detector.skip().status.name == "unreadable" and len(detector) == 91
 
 
+def test_allowed_places(images):
+    detector = loopbit.LoopDetector()
+    for image in images[:80]:
+        detector.process(image)
+    best = detector.query(images[80]).match
+    ranking, evidence = [], loopbit.Evidence()
+    found = detector.query(images[80], ranking=ranking, evidence=evidence,
+                           allowed=lambda place: place.frame != best)
+    assert found.match != best and best not in [r.place.frame for r in ranking]
+    assert len(evidence.inliers) == found.inliers > 0
+    for allowed in (range(best, best + 1), [loopbit.SessionFrame(0, best), 999],
+                    np.array([best], np.uint8), (best,)):
+        assert detector.query(images[80], allowed=allowed).match == best
+    assert detector.query(images[80], allowed=[]).status == loopbit.Status.no_similar_place
+    for wrong in ("12", 12, [1.5], ["12"], [None]):
+        with pytest.raises(TypeError, match="allowed"):
+            detector.process(images[80], allowed=wrong)
+
+    def fails(place):
+        raise KeyError(place)
+
+    with pytest.raises(KeyError):
+        detector.process(images[80], allowed=fails)
+    with pytest.raises(loopbit.OptionError, match="uses the detector"):
+        detector.process(images[80], allowed=lambda place: detector.query(images[0]).is_loop)
+    assert len(detector) == 80
+    assert detector.process(images[80], allowed=lambda place: True).match == best
+
+
+def test_rejected_loops_and_removed_places(images):
+    detector = loopbit.LoopDetector()
+    for image in images[:80]:
+        detector.process(image)
+    loop = detector.process(images[80])
+    assert loop.is_loop
+    detector.reject(loop)
+    assert not detector.query(images[80]).is_loop
+    next_loop = detector.process(images[83])
+    assert next_loop.is_loop
+    for frame in range(next_loop.match - 2, next_loop.match + 3):
+        detector.remove(frame)
+    assert abs((detector.query(images[83]).match or 999) - next_loop.match) > 2
+
+
 def test_every_status_is_explained():
     page = (ROOT / "docs/no_loop.md").read_text()
     for status in loopbit.Status.__members__:

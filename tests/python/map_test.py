@@ -113,6 +113,60 @@ def test_ranking_without_a_map(images):
         detector.query(images[80], ranking=())
 
 
+def test_removed_places_and_rejected_loops_are_in_the_map(town, images):
+    with loopbit.MapWriter(town, loopbit.LoopDetectorOptions(), "third lap") as map:
+        detector = loopbit.LoopDetector(map=map)
+        loops = [d for d in (detector.process(image) for image in images[LAP:LAP + 20])
+                 if d.is_loop]
+        wrong, other = loops[5:7]
+        detector.reject(wrong)
+        detector.reject(other.frame, other.earlier_match)
+        detector.reject(loopbit.SessionFrame(2, 0), loopbit.SessionFrame(1, 50))    # never found
+        detector.remove(3)
+        detector.remove(loopbit.SessionFrame(1, 4))
+        for place in ("3", 2.0, None):
+            with pytest.raises(TypeError, match="place is"):
+                detector.remove(place)
+        with pytest.raises(TypeError, match="match is None"):
+            detector.reject(3)
+        with pytest.raises(loopbit.OptionError, match="no frame 900"):
+            detector.remove(900)
+    map = loopbit.MapReader(town)
+    rejected = map.rejected_loops()
+    assert rejected["query_frame"].tolist() == [wrong.frame, other.frame, 0]
+    assert rejected["score"].tolist() == [wrong.score, other.score, 0]
+    assert rejected["match_frame"][0] == wrong.earlier_match.frame
+    pairs = map.loops()[["query_session", "query_frame"]].tolist()
+    assert (3, wrong.frame) not in pairs and (3, loops[0].frame) in pairs
+    places = map.places()[["session", "frame"]].tolist()
+    assert (3, 3) not in places and (1, 4) not in places and (3, 4) in places
+    with pytest.raises(loopbit.OptionError, match="MapWriter"):
+        loopbit.LoopDetector(map=map).remove(loopbit.SessionFrame(1, 5))
+
+
+def test_link(command, laps, images, tmp_path):
+    paths = [tmp_path / f"{name}.db" for name in ("first", "second", "met")]
+    for path, lap in zip(paths, (images[:LAP], images[LAP:], images[:LAP])):
+        record(path, lap, "a lap")
+    record(paths[2], images[LAP:], "a lap")
+    loopbit.merge_map(paths[0], paths[1])
+    assert [s.linked for s in loopbit.MapReader(paths[0]).sessions] == [True, False]
+    counts = loopbit.link_map(paths[0])
+    assert (counts.sessions, counts.places) == (1, len(images) - LAP)
+    assert repr(counts) == f"LinkCounts(sessions=1, places=60, loops={counts.loops})"
+
+    def between(path):
+        loops = loopbit.MapReader(path).loops()
+        return loops[loops["query_session"] != loops["match_session"]].tolist()
+
+    assert between(paths[0]) == between(paths[2]) and len(between(paths[0])) == counts.loops > 20
+    assert loopbit.link_map(str(paths[0])).places == 0
+    assert "all sessions" in command("map", "link", paths[0])
+    options = loopbit.LoopDetectorOptions(surf=loopbit.SurfOptions(max_keypoints=100))
+    with pytest.raises(loopbit.OptionError, match="max_keypoints"):
+        loopbit.link_map(paths[0], options)
+
+
 def test_reader(made, images):
     path, found = made
     map = loopbit.MapReader(path)

@@ -40,21 +40,21 @@ MergeCounts merge_map(const std::string& into, const std::string& from);
 /// The progress of link_map(), and its result.
 struct LinkCounts {
   std::int64_t sessions = 0;      ///< compared with all earlier ones
-  std::int64_t frames = 0;        ///< processed
-  std::int64_t total_frames = 0;  ///< to be processed; more than `frames` if it was stopped
-  std::int64_t loops = 0;         ///< found between sessions that had none for the frame
+  std::int64_t places = 0;        ///< of them, processed
+  std::int64_t total_places = 0;  ///< to be processed; more than `places` if it was stopped
+  std::int64_t loops = 0;         ///< found and stored
 };
 
 /// Finds the loops between sessions that never met, such as those of merged maps. Each session that
 /// is not `linked` is processed again, from its stored contents and features, with all earlier
 /// sessions as candidates. The map gets the loops that a run on that map would have found in
-/// earlier sessions. Its own loops within a session stay as they are.
+/// earlier sessions, unless it has one for the frame. Loops within a session stay as they are.
 ///
 /// `options`: none = those that each session was recorded with; of another version of loopbit only
 /// those of binary_content and surf, with defaults for the rest. `progress` is called for each
 /// frame; if it returns false, link_map() stops. Each session is added completely or not at all, so
 /// a second call continues after a stop or a kill. If all sessions are linked, no byte changes.
-/// Takes a few milliseconds per frame. Throws Error: kind output if the map has a writer or cannot
+/// Takes a few milliseconds per place. Throws Error: kind output if the map has a writer or cannot
 /// be written, option if `options` are not valid or differ from the map's settings of
 /// binary_content or surf, input if the map is damaged.
 LinkCounts link_map(const std::string& path,
