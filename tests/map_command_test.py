@@ -4,6 +4,7 @@
 """Maps as a user meets them: loopbit run --map, query and map."""
 
 import concurrent.futures
+import contextlib
 import csv
 import json
 import os
@@ -21,6 +22,15 @@ import zlib
 from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, loopbit, rows
 
 LAP = FRAMES // 2
+
+
+def has_open(pid, path):
+    """Whether a process has opened a file."""
+    for descriptor in pathlib.Path(f"/proc/{pid}/fd").iterdir():
+        with contextlib.suppress(OSError):    # it was closed just now
+            if descriptor.samefile(path):
+                return True
+    return False
 
 
 class MapCommandTest(CommandTest):
@@ -426,11 +436,13 @@ class MapCommandTest(CommandTest):
         loopbit("map", "merge", merged, other)
         before = merged.read_bytes()
         ended = set()
-        for attempt in range(40):    # some come before it begins, or after its end
+        for attempt in range(40):    # some come after its end
             shutil.copy(merged, copy)
             with subprocess.Popen([LOOPBIT, "map", "link", copy], stdout=subprocess.PIPE,
                                   stderr=subprocess.PIPE, text=True) as link:
-                time.sleep(0.02 * (attempt // 2 % 10 + 1))
+                while link.poll() is None and not has_open(link.pid, copy):
+                    time.sleep(0.001)
+                time.sleep(0.02 * (attempt // 2 % 5))
                 link.send_signal(signal.SIGKILL if attempt % 2 else signal.SIGINT)
                 out, err = link.communicate()
             ended.add(link.returncode)
@@ -439,9 +451,7 @@ class MapCommandTest(CommandTest):
                 self.assertIn("0 sessions", out)
                 self.assertEqual(copy.read_bytes(), before)
             self.assertEqual(loopbit("map", "check", copy).returncode, 0)
-            for log in self.scratch.glob("copy.db-*"):
-                log.unlink()
-            if ended >= {130, -signal.SIGKILL} and attempt >= 10:
+            if ended >= {130, -signal.SIGKILL} and attempt >= 5:
                 break
         self.assertGreaterEqual(ended, {130, -signal.SIGKILL})
         self.assertIn("1 sessions", loopbit("map", "link", merged).stdout)

@@ -68,8 +68,8 @@ struct handle_type_name<loopbit::python::QueryArgument> {
 
 template <>
 struct handle_type_name<loopbit::python::AllowedArgument> {
-  static constexpr auto name = const_name(
-      "Callable[[loopbit.SessionFrame], bool] | Sequence[int | loopbit.SessionFrame] | None");
+  static constexpr auto name =
+      const_name("Callable[[loopbit.SessionFrame], bool] | Sequence[int | loopbit.SessionFrame]");
 };
 // NOLINTEND
 
