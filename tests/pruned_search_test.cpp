@@ -197,6 +197,17 @@ TEST(PrunedSearch, OfEqualPlacesLooksAtFew) {
   EXPECT_LT(search.work().contents, 500);
 }
 
+TEST(PrunedSearch, WhereNearlyAllPlacesAreRefusedLooksAtThoseAllowed) {
+  Random random;
+  const Contents places = coherent_contents(random, 20'000);
+  PlaceStore store;
+  add_all(store, places);
+  const PlaceTest is_allowed = [](PlaceId place) { return place / 50 == 77; };
+  PrunedSearch search(store, store.size(), places[3'000], {}, active_instruction_set(), is_allowed);
+  EXPECT_EQ(search.run(), full_scan(places, places[3'000], store.size(), {}, is_allowed));
+  EXPECT_LT(search.work().contents, 3'000);
+}
+
 Stretch stretch_of(std::size_t number, int sum, int larger_count) {
   return {.number = static_cast<std::uint32_t>(number),
           .sum = static_cast<std::uint16_t>(sum),

@@ -9,12 +9,24 @@
 #include <variant>
 
 namespace loopbit {
+namespace {
 
-void CandidateFilter::remove(PlaceId place) {
+bool is_marked(PlaceId place, const std::vector<bool>& marks) {
   const auto index = static_cast<std::size_t>(place);
-  if (index >= removed_.size()) removed_.resize(index + 1);
-  removed_[index] = true;
+  return index < marks.size() && marks[index];
 }
+
+void mark(PlaceId place, std::vector<bool>& marks) {
+  const auto index = static_cast<std::size_t>(place);
+  if (index >= marks.size()) marks.resize(index + 1);
+  marks[index] = true;
+}
+
+}  // namespace
+
+bool CandidateFilter::is_removed(PlaceId place) const { return is_marked(place, removed_); }
+
+void CandidateFilter::remove(PlaceId place) { mark(place, removed_); }
 
 bool CandidateFilter::is_rejected(PlaceId place) const {
   return std::any_of(rejected_.begin(), rejected_.end(),
@@ -28,13 +40,11 @@ PlaceTest CandidateFilter::wanted(const AllowedPlaces& allowed) const {
   }
   const auto* list = std::get_if<std::span<const SessionFrame>>(&allowed);
   if (list == nullptr) return {};
-  const auto listed = std::make_shared<std::vector<PlaceId>>();  // copies of the test share it
+  const auto is_listed = std::make_shared<std::vector<bool>>();  // copies of the test share it
   for (const SessionFrame& at : *list) {
-    if (const auto place = places_.find(at)) listed->push_back(*place);
+    if (const auto place = places_.find(at)) mark(*place, *is_listed);
   }
-  std::sort(listed->begin(), listed->end());
-  return
-      [listed](PlaceId place) { return std::binary_search(listed->begin(), listed->end(), place); };
+  return [is_listed](PlaceId place) { return is_marked(place, *is_listed); };
 }
 
 PlaceTest CandidateFilter::test(const AllowedPlaces& allowed, bool changes_view) const {

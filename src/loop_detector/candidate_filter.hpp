@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "loopbit/loop_detector.hpp"
@@ -29,10 +30,7 @@ class CandidateFilter {
 
   void remove(PlaceId place);
 
-  [[nodiscard]] bool is_removed(PlaceId place) const {
-    const auto index = static_cast<std::size_t>(place);
-    return index < removed_.size() && removed_[index];
-  }
+  [[nodiscard]] bool is_removed(PlaceId place) const;
 
   /// Leaves out what shows the same place as `place` until the view changes.
   void reject(PlaceId place) { rejected_.push_back(places_.spot_of(place)); }

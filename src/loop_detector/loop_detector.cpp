@@ -559,7 +559,7 @@ Detection LoopDetector::process(const BinaryContent& content, Features features,
   Impl::Observation seen = impl_->observation();
   seen.content = content;
   seen.features = std::move(features);
-  const Detection detection = impl_->detect(timestamp_s, seen);
+  Detection detection = impl_->detect(timestamp_s, seen);
   impl_->remember(std::move(seen), detection, cv::Mat());
   return detection;
 }

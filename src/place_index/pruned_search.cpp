@@ -23,6 +23,11 @@ constexpr std::size_t kGroupRun = 128;
 constexpr std::size_t kFirstBatch = 16;
 constexpr std::size_t kBatchGrowth = 8;
 
+/// Once so many places that look alike were refused, and hardly any allowed, the allowed ones are
+/// sought first: the floor does not rise, so that bounds exclude nothing.
+constexpr std::int64_t kManyRefused = 1'000;
+constexpr std::int64_t kRefusedPerAllowed = 32;
+
 /// Contents are asked for so many stretches ahead of their use.
 constexpr std::size_t kAhead = 4;
 
@@ -89,6 +94,7 @@ std::vector<Candidate> PrunedSearch::run() {
   bound_coarse_stretches();
   bound_tail();
   search_coarse_stretches();
+  if (are_nearly_all_refused()) compare_allowed();
   return std::move(found_).answer();
 }
 
@@ -130,6 +136,7 @@ void PrunedSearch::search_coarse_stretches() {
   for (std::size_t end = sizes.size(); end > 0; wanted *= kBatchGrowth) {
     const std::size_t upper_sum = end * kSumsPerBucket;
     if (static_cast<int>(upper_sum) <= found_.least_overlap(query_count_)) break;
+    if (are_nearly_all_refused()) return;
     for (std::size_t got = 0; end > 0 && got < wanted;) got += sizes[--end];
     bound_sums_between(end * kSumsPerBucket, upper_sum);
     search_waiting();
@@ -168,6 +175,7 @@ void PrunedSearch::search_waiting() {
       bound_children(level);
     } else {
       compare_taken();
+      if (are_nearly_all_refused()) return;
     }
   }
 }
@@ -189,6 +197,7 @@ void PrunedSearch::compare_taken() {
                kFinestPlaces * sizeof(BinaryContent));
     }
     if (may_matter(kFinestLevel, taken_[i])) compare_stretch(taken_[i]);
+    if (are_nearly_all_refused()) return;
   }
 }
 
@@ -278,8 +287,25 @@ void PrunedSearch::consider(std::size_t place, int overlap) {
   }
 }
 
-bool PrunedSearch::may_be_found(PlaceId place) const {
-  if (is_allowed_ && !is_allowed_(place)) return false;
+bool PrunedSearch::are_nearly_all_refused() const {
+  return refused_ >= kManyRefused && refused_ >= kRefusedPerAllowed * allowed_;
+}
+
+/// Compares all places that are allowed, and no others, from the start.
+void PrunedSearch::compare_allowed() {
+  found_ = FoundPlaces(options_);
+  const PlaceTest is_allowed = std::exchange(is_allowed_, {});
+  for (std::size_t place = 0; place < end_; ++place) {
+    if (is_allowed(static_cast<PlaceId>(place))) compare_place(place);
+  }
+}
+
+bool PrunedSearch::may_be_found(PlaceId place) {
+  if (is_allowed_ && !is_allowed_(place)) {
+    ++refused_;
+    return false;
+  }
+  ++allowed_;
   // Within the map no two points are farther apart than this: there is no limit to look after.
   if (options_.max_center_distance_px >= kMaxCenterDistance_px) return true;
   const cv::Point2d apart = center(store_.content(static_cast<std::size_t>(place))) - query_center_;

@@ -75,13 +75,17 @@ class PrunedSearch {
   void compare_stretch(const Stretch& stretch);
   void compare_place(std::size_t place);
   void consider(std::size_t place, int overlap);
-  [[nodiscard]] bool may_be_found(PlaceId place) const;
+  void compare_allowed();
+  [[nodiscard]] bool are_nearly_all_refused() const;
+  [[nodiscard]] bool may_be_found(PlaceId place);
 
   const PlaceStore& store_;
   InstructionSet instruction_set_;
   const BoundKernels& kernels_;
   RetrievalOptions options_;
   PlaceTest is_allowed_;  ///< may be empty
+  std::int64_t allowed_ = 0;
+  std::int64_t refused_ = 0;
   std::size_t end_;
   std::size_t num_groups_;  ///< of coarsest stretches, all of them whole
   std::uint16_t query_count_;

@@ -106,7 +106,7 @@ class PlaceIndex {
   /// contents neither match nor are matched. Cost: bounds of all stretches, and the contents that
   /// they cannot exclude; see docs/retrieval.md. `work`, if not null, receives the amount of work.
   /// Places that `is_allowed` refuses are left out as if they did not exist. It is called only for
-  /// places that would otherwise matter, in any order, at most once each.
+  /// places that would otherwise matter, but for all of them if it refuses nearly all.
   [[nodiscard]] std::vector<Candidate> query(const BinaryContent& content, PlaceId end,
                                              const RetrievalOptions& options = {},
                                              RetrievalWork* work = nullptr,
