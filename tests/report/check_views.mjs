@@ -262,10 +262,11 @@ async function checkTimeBars(page, run) {
   }
 }
 
-export async function checkViews(page) {
+/** `isBrief`: fewer frames are clicked. */
+export async function checkViews(page, isBrief) {
   const run = (await embedded(page)).runs[0];
   const loops = run.status.flatMap((status, i) => (run.status_names[status] === "loop" ? [i] : []));
-  const frames = spread(loops.length > 0 ? loops : run.status.map((_, i) => i), 5);
+  const frames = spread(loops.length > 0 ? loops : run.status.map((_, i) => i), isBrief ? 3 : 5);
   const ofLoops = loops.length > 0 ? ["#matrix", "#precision-recall"] : [];
   const views = [];
   for (const view of ["#trajectory", "#score", ...ofLoops])
