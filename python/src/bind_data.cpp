@@ -51,7 +51,7 @@ std::string early_end_of(const SharedSource& source) {
   return source.early_end();
 }
 
-void bind_source(py::module_& module) {
+void bind_frame(py::module_& module) {
   py::class_<Frame>(module, "Frame", "One image of a sequence, or the reason why there is none.")
       .def_property_readonly("name", text_of(&Frame::name),
                              "The name in its folder or list, or its position.")
@@ -68,6 +68,9 @@ void bind_source(py::module_& module) {
                                     ? self.error
                                     : fmt::format("{} x {} px", self.image.cols, self.image.rows))};
       });
+}
+
+void bind_source(py::module_& module) {
   py::class_<SharedSource>(module, "ImageSource",
                            "A sequence of images, read in order: an iterator of Frame.")
       .def("__iter__", [](SharedSource& self) -> SharedSource& { return self; })
@@ -120,24 +123,25 @@ std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {
   return runs;
 }
 
+GroundTruth to_truth(const ArrayLike& same_place, const ArrayLike& near_place,
+                     const ArrayLike& ignored, const ArrayLike& unknown, int every, int frames) {
+  check_every(every);
+  GroundTruth truth;
+  truth.same_place = to_runs(same_place, "same_place");
+  truth.near_place = to_runs(near_place, "near_place");
+  truth.ignored = to_frames(ignored, "ignored");
+  truth.unknown = to_frames(unknown, "unknown");
+  truth.every = every;
+  truth.frames = frames;
+  return truth;
+}
+
 void bind_truth(py::module_& module) {
   py::class_<GroundTruth>(module, "GroundTruth",
                           "The ground truth of a sequence, counted in all its frames. Structured "
                           "arrays of query, first and last, int32: the frames first to last show "
                           "the place of frame query.")
-      .def(py::init([](const ArrayLike& same_place, const ArrayLike& near_place,
-                       const ArrayLike& ignored, const ArrayLike& unknown, int every, int frames) {
-             check_every(every);
-             GroundTruth truth;
-             truth.same_place = to_runs(same_place, "same_place");
-             truth.near_place = to_runs(near_place, "near_place");
-             truth.ignored = to_frames(ignored, "ignored");
-             truth.unknown = to_frames(unknown, "unknown");
-             truth.every = every;
-             truth.frames = frames;
-             return truth;
-           }),
-           py::arg("same_place"), py::arg("near_place") = py::tuple(),
+      .def(py::init(&to_truth), py::arg("same_place"), py::arg("near_place") = py::tuple(),
            py::arg("ignored") = py::tuple(), py::arg("unknown") = py::tuple(), whole("every") = 1,
            whole("frames") = 0,
            "From integers of shape (n, 2), query and match, or (n, 3), query, first and last. "
@@ -194,6 +198,7 @@ void bind_poses(py::module_& module) {
 
 void bind_data(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(PlaceRun, query, first, last);
+  bind_frame(module);
   bind_source(module);
   bind_truth(module);
   bind_poses(module);

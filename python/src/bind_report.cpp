@@ -16,14 +16,7 @@ namespace py = pybind11;
 
 void write_run_report(const FinishedRun& run, const std::filesystem::path& name,
                       const std::filesystem::path& path) {
-  ReportRun column;
-  column.name = name.string();
-  column.list = match_list(run.detections);
-  column.run = run;
-  column.positions_m = run.positions_m;
-  column.truth = run.truth;
-  column.evaluation = run.scoring().evaluation;
-  write_report(path.string(), {column});
+  write_report(path.string(), {to_report_run(name.string(), run)});
 }
 
 }  // namespace

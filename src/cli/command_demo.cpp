@@ -92,22 +92,14 @@ int demo_command(DemoFlags& flags, const Arguments& arguments) {
   return run_session(make_world_source(world), "demo", {}, flags.session);
 }
 
-std::string list_world_settings() {
-  std::string list = "World settings (--world NAME=VALUE):\n";
-  for_each_field<WorldOptions>([&](const auto& field) {
-    list += fmt::format("  {} = {}  [{} to {}] {}\n", field.name, WorldOptions{}.*field.member,
-                        field.min, field.max, field.help);
-  });
-  return list;
-}
-
 }  // namespace
 
 void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
   auto flags = std::make_shared<DemoFlags>();
   CLI::App* command =
       app.add_subcommand("demo", "Run the built-in world, whose true loops are known");
-  command->footer(list_world_settings() + list_truth_settings());
+  command->footer(list_settings<WorldOptions>("World settings (--world NAME=VALUE)") +
+                  list_truth_settings());
   flags->session.run.folder = "loopbit_demo";
   CLI::Option* out = command
                          ->add_option("--out", flags->session.run.folder,

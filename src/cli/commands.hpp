@@ -4,10 +4,14 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "loopbit/options.hpp"
 
 namespace loopbit::cli {
 
@@ -36,6 +40,17 @@ void add_options(CLI::App& app);
 
 /// "NAME=VALUE" in two. Throws Error (kind option) without a "=".
 std::pair<std::string, std::string> split_setting(const std::string& text);
+
+/// The fields of an options struct under a title, one a line.
+template <typename Options>
+std::string list_settings(std::string_view title) {
+  std::string list = fmt::format("{}:\n", title);
+  for_each_field<Options>([&](const auto& field) {
+    list += fmt::format("  {} = {}  [{} to {}] {}\n", field.name, Options{}.*field.member,
+                        field.min, field.max, field.help);
+  });
+  return list;
+}
 
 /// Replaces CLI::Range, which accepts nan and has a misleading message for 2.5 in 1 to 9.
 CLI::Validator whole_number(std::int64_t min, std::int64_t max);

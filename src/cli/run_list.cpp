@@ -49,18 +49,13 @@ std::pair<std::string, std::string> name_and_path(const std::string& text) {
 ListedRun listed_run(const std::string& text) {
   const auto [name, path] = name_and_path(text);
   ListedRun listed;
-  ReportRun& run = listed.run;
-  run.name = name;
   if (is_folder(path)) {
-    run.run = read_run(path);
-    run.list = match_list(run.run->detections);
-    run.truth = run.run->truth;
-    run.positions_m = run.run->positions_m;
-    run.evaluation = run.run->scoring().evaluation;
-    listed.frames = run.run->frames();
+    listed.run = to_report_run(name, read_run(path));
+    listed.frames = listed.run.run->frames();
   } else {
-    run.list = read_match_list(path);
-    listed.frames.times_s = run.list.times_s;
+    listed.run.name = name;
+    listed.run.list = read_match_list(path);
+    listed.frames.times_s = listed.run.list.times_s;
   }
   return listed;
 }

@@ -90,17 +90,13 @@ void TruthFlags::add_poses_to(CLI::App& command) {
 }
 
 Positions TruthFlags::read_positions(const FramesRead& frames) const {
-  const std::string file = poses.empty() ? scoring.poses_file() : poses;
+  const std::string file = scoring.poses_file(poses);
   if (file.empty()) return {};
   return loopbit::read_positions(file, frames);
 }
 
 std::string list_truth_settings() {
-  std::string list = "Truth by poses (--truth-set NAME=VALUE):\n";
-  for_each_field<PoseTruthOptions>([&](const auto& field) {
-    list += fmt::format("  {} = {}  [{} to {}] {}\n", field.name, PoseTruthOptions{}.*field.member,
-                        field.min, field.max, field.help);
-  });
+  std::string list = list_settings<PoseTruthOptions>("Truth by poses (--truth-set NAME=VALUE)");
   list += "Protocols (--protocol NAME); numbers of different protocols must not be mixed:\n";
   for (const Protocol& protocol : protocols()) {
     list += fmt::format("  {}: {}\n", protocol.name, protocol.help);

@@ -68,7 +68,8 @@ std::string ScoringRequest::description() const {
   return text;
 }
 
-std::string ScoringRequest::poses_file() const {
+std::string ScoringRequest::poses_file(const std::string& given) const {
+  if (!given.empty()) return given;
   return !truth.empty() && truth_kind(truth) == TruthKind::poses ? truth : "";
 }
 

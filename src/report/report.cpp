@@ -8,6 +8,7 @@
 #include <limits>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -380,6 +381,17 @@ std::string report_json(const std::vector<ReportRun>& runs, const ReportOptions&
     json["runs"].push_back(run_json(run, runs, static_cast<std::size_t>(max_bytes)));
   }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+ReportRun to_report_run(const std::string& name, FinishedRun run) {
+  ReportRun made;
+  made.name = name;
+  made.list = match_list(run.detections);
+  made.positions_m = run.positions_m;
+  made.truth = run.truth;
+  made.evaluation = run.scoring().evaluation;
+  made.run = std::move(run);
+  return made;
 }
 
 void write_report(const std::string& path, const std::vector<ReportRun>& runs,

@@ -225,8 +225,7 @@ class RecordedRun {
     std::optional<Positions> positions_m = request_.positions_m;
     if (is_cut_off && positions_m) positions_m->resize(frames_.times_s.size());
     check_positions(positions_m, frames_.times_s.size());
-    const std::string file =
-        request_.poses.empty() ? request_.scoring.poses_file() : request_.poses;
+    const std::string file = request_.scoring.poses_file(request_.poses);
     if (!positions_m && !file.empty()) positions_m = read_positions(file, frames_);
     if (positions_m) folder_.write_positions(*positions_m);
   }

@@ -24,7 +24,7 @@ export async function launch(modules) {
   const require = createRequire(path.join(path.resolve(modules), "anchor.js"));
   const { chromium } = require("playwright-core");
   return chromium.launch({
-    executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+    executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium-headless-shell",
     args: kFlags,
   });
 }
@@ -71,8 +71,16 @@ export async function settled(page) {
   });
 }
 
-export const embedded = (page) =>
-  page.evaluate(() => JSON.parse(document.getElementById("report-data").textContent));
+const embeddedData = new WeakMap();
+
+/** The report's data; a page keeps them for as long as it is open, and fetching megabytes takes time. */
+export async function embedded(page) {
+  if (!embeddedData.has(page)) {
+    const text = await page.textContent("#report-data");
+    embeddedData.set(page, JSON.parse(text));
+  }
+  return embeddedData.get(page);
+}
 
 export const textOf = (page, key) =>
   page.evaluate((name) => document.querySelector(`[data-key="${name}"]`)?.textContent ?? null, key);
@@ -87,15 +95,19 @@ export function assertShows(text, value, what) {
   assert.ok(apart <= 0.5001 * unit, `${what}: the page says '${text}', the data ${value}`);
 }
 
-/** Selects a frame as a person would: by its number. */
+/** Selects a frame by its number, without the keys that enter it: checkSearch() presses those. */
 export async function goTo(page, frame) {
-  await page.fill("#frame-number", String(frame));
-  await page.press("#frame-number", "Enter");
-  await page.evaluate(() => document.activeElement.blur());
+  await page.evaluate((number) => {
+    const field = document.getElementById("frame-number");
+    field.value = number;
+    field.dispatchEvent(new Event("change"));
+    document.activeElement.blur();
+  }, String(frame));
   await settled(page);
 }
 
-export const shownFrame = async (page) => Number(await page.inputValue("#frame-number"));
+export const shownFrame = (page) =>
+  page.evaluate(() => Number(document.getElementById("frame-number").value));
 
 /** Name and value of the address after '#'. */
 export const address = async (page) =>

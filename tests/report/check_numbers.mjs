@@ -283,14 +283,15 @@ const misdrawn = () => {
   return [...stretched, ...outside];
 };
 
-/** Of some pairs all that the pair browser says. */
-export async function checkPairs(page) {
+/** Of some pairs all that the pair browser says; of fewer, if `isBrief`. */
+export async function checkPairs(page, isBrief) {
   const run = (await embedded(page)).runs[0];
   const loops = run.status.flatMap((status, i) => (run.status_names[status] === "loop" ? [i] : []));
   const others = run.match.flatMap((match, i) => (match >= 0 && !loops.includes(i) ? [i] : []));
   const close = others.filter((frame) => Math.abs(run.score[frame] - run.threshold) < 0.01);
   let compared = 0;
-  for (const frame of [...spread(loops, 12), ...spread(others, 6), ...spread(close, 2)]) {
+  const [some, few, one] = isBrief ? [5, 2, 1] : [12, 6, 2];
+  for (const frame of [...spread(loops, some), ...spread(others, few), ...spread(close, one)]) {
     await goTo(page, frame);
     const match = run.match[frame];
     await checkTag(page, run, frame);

@@ -16,41 +16,62 @@ async function ringOf(page, view) {
   }, view);
 }
 
-/** Where a frame is drawn, a click selects it, or one that is drawn at the same place. */
-async function checkClicks(page, view, frames) {
+/** The middle of each view's mark of the selection, from the corner of its plot; null without a mark. */
+const marksOf = (page, views) =>
+  page.evaluate(
+    (names) =>
+      names.map((name) => {
+        const ring = document.querySelector(`${name} .overlay .selected`);
+        if (!ring) return null;
+        const [mark, plot] = [ring, ring.closest(".u-over")].map((one) =>
+          one.getBoundingClientRect(),
+        );
+        const x = mark.left + mark.width / 2 - plot.left;
+        const y = mark.top + mark.height / 2 - plot.top;
+        return { x, y, frame: Number(ring.dataset.frame) };
+      }),
+    views,
+  );
+
+/** Where a frame is marked, a click selects it, or one that is drawn at the same place. */
+async function checkClicks(page, view, marks) {
   const kSamePlace_px = 9;
+  await page.$eval(`${view} .u-over`, (plot) => plot.scrollIntoView({ block: "center" }));
+  const plot = await page.locator(`${view} .u-over`).boundingBox();
+  await page.keyboard.press("Home");
   let exact = 0;
-  let clicked = 0;
-  for (const frame of frames) {
-    await goTo(page, frame);
-    const ring = await ringOf(page, view);
-    if (!ring) continue;
-    assert.equal(ring.frame, frame, `${view} marks another frame`);
-    await page.keyboard.press("Home");
-    await page.mouse.click(ring.x, ring.y);
+  for (const { x, y, frame } of marks) {
+    await page.mouse.click(plot.x + x, plot.y + y);
     await settled(page);
-    const now = await ringOf(page, view);
+    const [now] = await marksOf(page, [view]);
     assert.ok(now, `${view}: nothing is marked after a click at frame ${frame}`);
     assert.equal(now.frame, await shownFrame(page), `${view} and the pair browser disagree`);
-    const apart = Math.hypot(now.x - ring.x, now.y - ring.y);
+    const apart = Math.hypot(now.x - x, now.y - y);
     assert.ok(
       apart <= kSamePlace_px,
       `${view}: a click at frame ${frame} selects ${now.frame}, ${apart.toFixed(0)} px away`,
     );
     exact += now.frame === frame ? 1 : 0;
-    ++clicked;
   }
-  if (clicked > 1) assert.ok(exact > 0, `${view}: no click selected the very frame`);
-}
-
-async function checkHover(page, view, frame) {
-  await goTo(page, frame);
-  const ring = await ringOf(page, view);
-  if (!ring) return;
-  await page.mouse.move(ring.x, ring.y);
+  if (marks.length > 1) assert.ok(exact > 0, `${view}: no click selected the very frame`);
+  await page.mouse.move(plot.x + marks[0].x, plot.y + marks[0].y);
   const tip = await page.textContent(".tip:not([hidden])");
   assert.match(tip, /frame|query|score/, `${view}: the note says '${tip}'`);
   await page.mouse.move(2, 2);
+}
+
+/** Clicks and hovering at some frames, in every view that marks them. */
+async function checkMarks(page, views, frames) {
+  const marks = new Map(views.map((view) => [view, []]));
+  for (const frame of frames) {
+    await goTo(page, frame);
+    for (const [i, mark] of (await marksOf(page, views)).entries()) {
+      if (!mark) continue;
+      assert.equal(mark.frame, frame, `${views[i]} marks another frame`);
+      marks.get(views[i]).push(mark);
+    }
+  }
+  for (const [view, its] of marks) if (its.length > 0) await checkClicks(page, view, its);
 }
 
 const drawingOf = (page, view) => page.$eval(`${view} canvas`, (canvas) => canvas.toDataURL());
@@ -241,16 +262,16 @@ async function checkTimeBars(page, run) {
   }
 }
 
-export async function checkViews(page) {
+/** `isBrief`: fewer frames are clicked. */
+export async function checkViews(page, isBrief) {
   const run = (await embedded(page)).runs[0];
   const loops = run.status.flatMap((status, i) => (run.status_names[status] === "loop" ? [i] : []));
-  const frames = spread(loops.length > 0 ? loops : run.status.map((_, i) => i), 5);
-  for (const view of ["#trajectory", "#score", "#matrix", "#precision-recall"]) {
-    if (!(await page.isVisible(`${view} .plot`))) continue;
-    const marked = view === "#matrix" || view === "#precision-recall" ? spread(loops, 5) : frames;
-    await checkClicks(page, view, marked);
-    if (marked[0] !== undefined) await checkHover(page, view, marked[0]);
-  }
+  const frames = spread(loops.length > 0 ? loops : run.status.map((_, i) => i), isBrief ? 3 : 5);
+  const ofLoops = loops.length > 0 ? ["#matrix", "#precision-recall"] : [];
+  const views = [];
+  for (const view of ["#trajectory", "#score", ...ofLoops])
+    if (await page.isVisible(`${view} .plot`)) views.push(view);
+  await checkMarks(page, views, frames);
   await checkNoMarkElsewhere(page, run);
   const withMatch = loops.find((frame) => run.match[frame] >= 0);
   if (withMatch !== undefined) {

@@ -61,7 +61,8 @@ const kSamples = {
 };
 /** Most of a check is waiting for what is on the screen. */
 const kReportsAtOnce = 3;
-/** The samples that also stand for looks and keys; the others differ in data only. */
+/** The samples that also stand for looks and keys; the others differ in data only, and are looked at in
+ * fewer places. */
 const kInFull = ["several revisits", "three runs", "one frame"];
 
 function argumentsOf(words) {
@@ -137,8 +138,8 @@ async function checkReport(
   };
   await run("drawn", checkDrawn);
   await run("numbers", (page) => checkNumbers(page, runJson));
-  await run("pairs", async (page) => `${await checkPairs(page)} times xi compared`);
-  await run("clicks, hovering, zoom", checkViews);
+  await run("pairs", async (page) => `${await checkPairs(page, isBrief)} times xi compared`);
+  await run("clicks, hovering, zoom", (page) => checkViews(page, isBrief));
   await run("filters and arrow keys", checkFilters);
   await run("true place", checkTruePlace);
   await run("search", checkSearch);

@@ -313,7 +313,8 @@ const kMapArguments = [
   "street.db",
 ];
 
-/** Contents and matrices by the number of frames, which is all that they depend on. */
+/** Places, contents and matrices by the number of frames, which is all that they depend on. */
+const madePlaces = new Map();
 const madeContents = new Map();
 const madeMatrices = new Map();
 const madeOnce = (made, frames, make) => {
@@ -444,7 +445,7 @@ const kDefaults = {
 /** The ReportData of src/report/web/src/report_data.ts. */
 export function sampleData(wanted = {}) {
   const options = { ...kDefaults, ...wanted };
-  const places = placesOf(options.frames);
+  const places = madeOnce(madePlaces, options.frames, () => placesOf(options.frames));
   const runs = Array.from({ length: options.runs }, (_, i) => runOf(places, i, options));
   return { loopbit: "0.1.0", runs };
 }

@@ -47,23 +47,29 @@ export function distance_m(a_m, b_m) {
 
 export const lap_m = kLap_m;
 
+/** Makes something of an object once, and keeps it as long as the object. */
+const onceEach = (make) => {
+  const made = new WeakMap();
+  return (of) => {
+    if (!made.has(of)) made.set(of, make(of));
+    return made.get(of);
+  };
+};
+
 /** The posts in view, the farthest first; x from 0 to 1 is left to right. */
-function seenFrom({ along_m, aside_m }) {
-  return posts
-    .map((post, id) => ({ ...post, id, ahead_m: (post.along_m - along_m + 10 * kLap_m) % kLap_m }))
-    .filter(({ ahead_m }) => ahead_m > 3 && ahead_m < kView_m)
-    .map((post) => ({
-      id: post.id,
-      grey: post.grey,
-      x: 0.5 + (0.7 * (post.aside_m - aside_m)) / post.ahead_m,
-      width: post.width_m / post.ahead_m,
-      top: 0.5 - (0.8 * (post.height_m - 1.5)) / post.ahead_m,
-      bottom: 0.5 + 1.2 / post.ahead_m,
-      ahead_m: post.ahead_m,
-    }))
-    .filter(({ x }) => x > 0 && x < 1)
-    .sort((a, b) => b.ahead_m - a.ahead_m);
-}
+const seenFrom = onceEach(({ along_m, aside_m }) => {
+  const seen = [];
+  for (const [id, post] of posts.entries()) {
+    const ahead_m = (post.along_m - along_m + 10 * kLap_m) % kLap_m;
+    if (ahead_m <= 3 || ahead_m >= kView_m) continue;
+    const x = 0.5 + (0.7 * (post.aside_m - aside_m)) / ahead_m;
+    if (x <= 0 || x >= 1) continue;
+    const width = post.width_m / ahead_m;
+    const top = 0.5 - (0.8 * (post.height_m - 1.5)) / ahead_m;
+    seen.push({ id, grey: post.grey, x, width, top, bottom: 0.5 + 1.2 / ahead_m, ahead_m });
+  }
+  return seen.sort((a, b) => b.ahead_m - a.ahead_m);
+});
 
 function chunk(type, data) {
   const body = Buffer.concat([Buffer.from(type, "latin1"), data]);
@@ -176,27 +182,47 @@ function inliersOf(place, other) {
   return Buffer.from(Float32Array.from(numbers.map((x) => Math.min(1, Math.max(0, x)))).buffer);
 }
 
-/** As the report has it; PNG stands in for JPEG, which browsers tell apart by content. */
-export function evidenceAt(place, other) {
+const viewOf = onceEach((place) => {
   const content = contentAt(place);
   return {
     jpeg: pictureOf(seenFrom(place)),
     saliency: saliencyOf(content),
     content: packed(content),
+  };
+});
+
+/** As the report has it; PNG stands in for JPEG, which browsers tell apart by content. */
+export function evidenceAt(place, other) {
+  return {
+    ...viewOf(place),
     inliers: other ? inliersOf(place, other).toString("base64") : null,
   };
 }
 
-/** xi with an even shift tolerance, bit by bit: the plain meaning of the equation. */
+/** Of a content, the columns of the ones of each row. */
+const columnsOf = onceEach((bits) => {
+  const rows = [];
+  let count = 0;
+  for (let y = 0; y < kSide; ++y) {
+    const row = [];
+    for (let x = 0; x < kSide; ++x) if (bits[y * kSide + x] === 1) row.push(x);
+    rows.push(row);
+    count += row.length;
+  }
+  return { rows, count };
+});
+
+/** xi with an even shift tolerance, one by one: the plain meaning of the equation. */
 export function similarity(a, b, tolerance) {
-  const count = (bits) => bits.reduce((sum, bit) => sum + bit, 0);
-  const larger = Math.max(count(a), count(b));
+  const { rows, count } = columnsOf(a);
+  const larger = Math.max(count, columnsOf(b).count);
   let best = 0;
   for (let shift = -tolerance; shift <= tolerance; shift += 2) {
     let both = 0;
     for (let y = 0; y < kSide; ++y) {
-      for (let x = Math.max(0, -shift); x < Math.min(kSide, kSide - shift); ++x) {
-        both += a[y * kSide + x] & b[y * kSide + x + shift];
+      for (const x of rows[y]) {
+        const shifted = x + shift;
+        if (shifted >= 0 && shifted < kSide) both += b[y * kSide + shifted];
       }
     }
     best = Math.max(best, both);

@@ -53,8 +53,8 @@ struct ScoringRequest {
   /// One line about the truth, for people; empty without a file of truth.
   [[nodiscard]] std::string description() const;
 
-  /// `truth` if it is a file of poses, otherwise empty.
-  [[nodiscard]] std::string poses_file() const;
+  /// `given`, or, if that is empty, `truth` if it is a file of poses; otherwise empty.
+  [[nodiscard]] std::string poses_file(const std::string& given = {}) const;
 
  private:
   /// Throws Error (kind option) for fields that contradict each other, or need a file of truth.

@@ -22,6 +22,9 @@ struct ReportRun {
   EvaluationOptions evaluation;
 };
 
+/// `run` as it is, under a name.
+ReportRun to_report_run(const std::string& name, FinishedRun run);
+
 struct ReportOptions {
   /// If the pictures would take more than this, some are left out evenly.
   double max_pictures_mb = 12.0;
