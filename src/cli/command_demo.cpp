@@ -56,7 +56,7 @@ void check_nothing_is_detected(const DemoFlags& flags) {
 
 void write_images(const World& world, const std::string& folder) {
   {
-    Progress progress(static_cast<std::size_t>(world.options().frames), false);
+    Progress progress(static_cast<std::size_t>(world.options().frames), {.of_detection = false});
     write_dataset(world, folder, [&](int) { progress.advance(false); });
   }
   fmt::print(
