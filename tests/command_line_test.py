@@ -143,6 +143,8 @@ class CommandLineTest(CommandTest):
         self.assertEqual(loopbit(*run, "--out", self.out).stdout, "")
         shown = self.on_terminal(80, "stderr", *run, "--out", self.scratch / "again")
         self.assertRegex(shown, r"^loopbit: [^\r\n]*z\.png[^\r\n]*\r?\n$")
+        wrote = loopbit("demo", *WORLD, "--write-images", self.scratch / "town", "--quiet")
+        self.assertEqual((wrote.returncode, wrote.stdout, wrote.stderr), (0, "", ""))
 
     def test_the_report_opens_in_a_browser(self):
         browser = self.scratch / "browser"

@@ -9,8 +9,8 @@
 
 namespace loopbit::cli {
 
-/// Prints what `loopbit run --json` finds on stdout, one JSON object per line, each as soon as it is
-/// known; docs/run_folder.md lists the keys. Throws Error (kind output).
+/// Prints what `loopbit run --json` finds on stdout, one JSON object per line, each as soon as it
+/// is known; docs/run_folder.md lists the keys. Throws Error (kind output).
 class JsonLines {
  public:
   /// Prints the frame if it is a loop.

@@ -43,8 +43,8 @@ void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb);
 void add_image_flag(CLI::App& command, int& max_megapixels);
 
 /// Runs a detector over the frames of `input` that `sampling` leaves, as `flags` ask, with progress
-/// on stderr and a summary or JSON on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in order.
-/// Throws Error.
+/// on stderr and a summary or JSON on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in
+/// order. Throws Error.
 int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
                 const Sampling& sampling, SessionFlags flags);
 
