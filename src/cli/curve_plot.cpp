@@ -46,7 +46,7 @@ std::string at(double recall, double precision) {
 }
 
 std::string stroke(std::size_t run) {
-  return fmt::format("stroke=\"{}\" stroke-dasharray=\"{}\"", kColours[run % kColours.size()],
+  return fmt::format(R"(stroke="{}" stroke-dasharray="{}")", kColours[run % kColours.size()],
                      kDashes[run / kColours.size() % kDashes.size()]);
 }
 
