@@ -20,7 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parent
 
 
 class BuildWithCMake(build_ext):
-    """Has CMake build the one extension, and copies it to where setuptools expects it."""
+    """Has CMake build the one extension and the command, and copies them into the package."""
 
     def build_extension(self, ext):
         build = os.environ.get("LOOPBIT_BUILD_DIR")
@@ -28,15 +28,17 @@ class BuildWithCMake(build_ext):
             build = pathlib.Path(self.build_temp).resolve()
             configure(build)
         jobs = self.parallel or os.cpu_count()
-        cmake("--build", build, "--target", "loopbit_python", "--parallel", jobs)
-        target = pathlib.Path(self.get_ext_fullpath(ext.name))
-        self.mkpath(str(target.parent))
-        self.copy_file(str(pathlib.Path(build) / "python/loopbit" / target.name), str(target))
+        cmake("--build", build, "--target", "loopbit_python", "loopbit_cli", "--parallel", jobs)
+        module = pathlib.Path(self.get_ext_fullpath(ext.name))
+        command = module.parent / "bin/loopbit"  # see _command.py
+        self.mkpath(str(command.parent))
+        self.copy_file(str(pathlib.Path(build) / "python/loopbit" / module.name), str(module))
+        self.copy_file(str(pathlib.Path(build) / "src/cli/loopbit"), str(command))
 
 
 def configure(build):
     cmake("-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
-          "-DLOOPBIT_BUILD_PYTHON=ON", "-DLOOPBIT_BUILD_CLI=OFF", "-DLOOPBIT_BUILD_TESTS=OFF",
+          "-DLOOPBIT_BUILD_PYTHON=ON", "-DLOOPBIT_BUILD_CLI=ON", "-DLOOPBIT_BUILD_TESTS=OFF",
           "-DLOOPBIT_BUILD_BENCHMARKS=OFF", f"-DPython3_EXECUTABLE={sys.executable}",
           *installed_pybind11(), *shlex.split(os.environ.get("CMAKE_ARGS", "")))
 

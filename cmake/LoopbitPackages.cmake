@@ -1,7 +1,14 @@
-# The Debian packages that `cpack -G DEB` makes of a build with shared libraries; see scripts/packages.
+# The Debian packages that `cpack -G DEB` makes of a build with shared libraries, and the tarballs that
+# `cpack -G TGZ` and CPackSourceConfig.cmake make; see scripts/packages.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "The loopbit authors <authors@loopbit.invalid>")
-set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
+set(CPACK_PACKAGE_FILE_NAME ${PROJECT_NAME}-${PROJECT_VERSION}-${CMAKE_SYSTEM_NAME}-${CMAKE_SYSTEM_PROCESSOR})
+set(CPACK_SOURCE_GENERATOR TGZ)
+set(CPACK_SOURCE_PACKAGE_FILE_NAME ${PROJECT_NAME}-${PROJECT_VERSION})
+# As .gitignore.
+set(root ${PROJECT_SOURCE_DIR})
+set(CPACK_SOURCE_IGNORE_FILES "^${root}/build/" "^${root}/loopbit_demo/" "^${root}/[.]git(/|$)" /node_modules/
+                              /dist/ /__pycache__/ [.]egg-info/ "^${root}/python/loopbit/.*[.]so$")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL lib map images data dev tools python)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
@@ -77,4 +84,6 @@ foreach(component ${CPACK_COMPONENTS_ALL})
           COMPONENT ${component}
           EXCLUDE_FROM_ALL)
 endforeach()
+# Of no package above, which have it as copyright.
+install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT licence)
 include(CPack)

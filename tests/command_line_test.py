@@ -116,6 +116,36 @@ class CommandLineTest(CommandTest):
         self.assertEqual(sorted(path.name for path in self.scratch.glob("few_*")),
                          ["few_loops", "few_loops_2", "few_loops_3"])
 
+    def test_json_is_one_line_per_loop_and_a_summary(self):
+        ran = loopbit("run", self.images, "--out", self.out, "--no-report", "--json")
+        self.assertEqual((ran.returncode, complaints(ran)), (0, []))
+        *loops, summary = map(json.loads, ran.stdout.splitlines())
+        expected = [row for row in rows(self.out) if row["status"] == "loop"]
+        self.assertEqual(len(loops), len(expected))
+        for loop, row in zip(loops, expected):
+            self.assertEqual(loop.pop("type"), "loop")
+            self.assertEqual(f"{loop.pop('similarity'):.6f}", row["similarity"])
+            self.assertEqual({key: str(value) for key, value in loop.items()},
+                             {key: row[key] for key in loop})
+        self.assertEqual(summary, {"type": "summary", "folder": str(self.out),
+                                   "run": json.loads((self.out / "run.json").read_text())})
+
+    def test_json_that_cannot_be_printed_ends_the_run(self):
+        with open("/dev/full", "w") as full:
+            ran = subprocess.run([LOOPBIT, "run", self.images, "--out", self.out, "--json"],
+                                 stdin=subprocess.DEVNULL, stdout=full, stderr=subprocess.PIPE, text=True)
+        self.assert_fails(ran, 4, "standard output")
+
+    def test_a_quiet_run_prints_nothing_but_errors(self):
+        few = self.few_images(3)
+        (few / "z.png").write_text("no image")
+        run = ["run", few, "--quiet", "--no-report"]
+        self.assertEqual(loopbit(*run, "--out", self.out).stdout, "")
+        shown = self.on_terminal(80, "stderr", *run, "--out", self.scratch / "again")
+        self.assertRegex(shown, r"^loopbit: [^\r\n]*z\.png[^\r\n]*\r?\n$")
+        wrote = loopbit("demo", *WORLD, "--write-images", self.scratch / "town", "--quiet")
+        self.assertEqual((wrote.returncode, wrote.stdout, wrote.stderr), (0, "", ""))
+
     def test_the_report_opens_in_a_browser(self):
         browser = self.scratch / "browser"
         browser.write_text('#!/bin/sh\necho "$1" >"$0.shown"\n')

@@ -9,6 +9,7 @@ import pathlib
 import shutil
 import subprocess
 import unittest
+import xml.etree.ElementTree as ElementTree
 
 from loopbit_command import FRAMES, LOOPBIT, CommandTest, loopbit, rows
 from mat_file import write_mat
@@ -300,6 +301,59 @@ class EvaluationCommandTest(CommandTest):
         self.assertEqual(table[0]["positives"], table[1]["positives"])
         self.assertIn("p99", table[0]["time_ms"])
         self.assertGreater(page.stat().st_size, 10000)
+
+    def plotted(self, *command):
+        """The points of the curves, the decisions and the words of a plot."""
+        plot = self.scratch / "plot.svg"
+        ran = loopbit(*command, "--plot", plot)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn(f"plot       {plot}", ran.stdout)
+        svg = ElementTree.parse(plot).getroot()
+        tag = "{http://www.w3.org/2000/svg}"
+        # Of the square between the axes, the shares from its left and from its bottom.
+        left, top, side = (float(svg.find(f"{tag}rect").get(key)) for key in ("x", "y", "width"))
+        share = lambda x, y: ((float(x) - left) / side, 1 - (float(y) - top) / side)
+        curves = [[share(*point.split(",")) for point in line.get("points").split()]
+                  for line in svg.iter(f"{tag}polyline") if line.get("stroke-width")]
+        dots = [share(dot.get("cx"), dot.get("cy")) for dot in svg.iter(f"{tag}circle")]
+        return curves[::2], dots, [text.text for text in svg.iter(f"{tag}text")]
+
+    def test_a_plot_shows_what_eval_prints(self):
+        curves, dots, words = self.plotted("eval", self.reference)
+        score = self.score(self.reference)
+        expected = [(point["recall"], point["precision"]) for point in score["curve"]]
+        for some, others in ((curves[0], expected), (expected, curves[0]),
+                             (dots, [(score["recall"], score["precision"])])):
+            for x, y in some:
+                self.assertLess(min(abs(x - u) + abs(y - v) for u, v in others), 0.001, (x, y))
+        self.assertIn("reference", words)
+
+    def test_a_plot_shows_all_compared_runs(self):
+        other = self.file("dbow2.csv", "query,match,score\n30,1,0.5\n")
+        curves, dots, words = self.plotted("compare", self.reference, f"A&B<2>={other}")
+        self.assertEqual([len(curves), len(dots), words[-2:]], [2, 2, ["reference", "A&B<2>"]])
+        nowhere = self.scratch / "none/plot.svg"
+        self.assert_fails(loopbit("eval", self.reference, "--plot", nowhere), 4, nowhere)
+
+    def test_pairs_of_images_are_those_of_the_loops(self):
+        expected = "".join(f"{row['name']} {row['match_name']}\n" for row in rows(self.reference)
+                           if row["status"] == "loop")
+        self.assertEqual(loopbit("pairs", self.reference).stdout, expected)
+        pairs = self.scratch / "pairs.txt"
+        self.assertEqual(loopbit("pairs", self.reference, "--out", pairs).returncode, 0)
+        self.assertEqual(pairs.read_text(), expected)
+
+    def test_pairs_need_names_that_a_list_can_hold(self):
+        run = self.scratch / "run"
+        run.mkdir()
+        header, *lines = (self.reference / "loops.csv").read_text().splitlines()
+        loop = next(row for row in rows(self.reference) if row["status"] == "loop")
+        for name in ("a b.png", "a\\x2cb.png", ""):
+            with self.subTest(name):
+                changed = [",".join([*cells[:8], name if cells[0] == loop["match"] else cells[8], *cells[9:]])
+                           for cells in (line.split(",") for line in lines)]
+                (run / "loops.csv").write_text("\n".join([header, *changed, ""]))
+                self.assert_fails(loopbit("pairs", run), 3, f"Frame {loop['match']}", f"'{name}'")
 
     def test_runs_that_cannot_be_compared(self):
         short = self.scratch / "short"

@@ -40,6 +40,27 @@ for name in precision_recall times similarity trajectory; do
 done
 test -s "$scratch/figures/report.html"
 
+# The notebook prints what is committed with it, and draws figures.
+mkdir "$scratch/notebook"
+cp "$examples/first_steps.ipynb" "$scratch/notebook"
+PATH=$prefix/bin:$PATH PYDEVD_DISABLE_FILE_VALIDATION=1 "$python" -m nbconvert --log-level=WARN --to notebook \
+  --execute --inplace --ExecutePreprocessor.record_timing=False "$scratch/notebook/first_steps.ipynb"
+"$python" - "$examples/first_steps.ipynb" "$scratch/notebook/first_steps.ipynb" <<'END'
+import json
+import sys
+
+
+def outputs(notebook):
+    with open(notebook) as file:
+        cells = json.load(file)["cells"]
+    return [[output.get("text") or sorted(output["data"]) for output in cell.get("outputs", [])] for cell in cells]
+
+
+committed, executed = map(outputs, sys.argv[1:])
+assert committed == executed, f"{executed}; if this is right, copy {sys.argv[2]} to examples/"
+assert sum("image/png" in output for cell in executed for output in cell) == 2
+END
+
 # The first lap is the map, and every tenth image of the second asks it.
 "$prefix/bin/loopbit" run "$scratch/town/images" --map "$scratch/town.db" --limit 75 --no-report \
   2>"$scratch/progress"

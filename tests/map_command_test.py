@@ -94,6 +94,17 @@ class MapCommandTest(CommandTest):
                    if row["status"] == "loop" and re.fullmatch(r"1:\d+", row["match"])]
         self.assertGreater(len(earlier), len(found) / 2)
 
+    def test_json_names_the_session_of_a_match(self):
+        ran = loopbit("run", self.laps[1], "--map", self.copy_of_map(), "--no-report", "--json",
+                      "--limit", LAP // 2)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        found = [json.loads(line) for line in ran.stdout.splitlines()][:-1]
+        expected = [row["match"].split(":") for row in rows(self.scratch / "copy_session_3")
+                    if row["status"] == "loop" and ":" in row["match"]]
+        self.assertEqual([[str(n) for n in loop["earlier_match"].values()]
+                          for loop in found if "match" not in loop], expected)
+        self.assertTrue(expected or QUICK)
+
     def test_a_run_with_a_map_can_be_scored_and_shown(self):
         run = self.made / "town_session_2"
         truth = self.scratch / "truth.csv"

@@ -35,6 +35,8 @@ link loopbit_data -lloopbit_images -lloopbit_map -lloopbit
 link loopbit_report -lloopbit_data -lloopbit_images -lloopbit_map -lloopbit
 
 grep -q '^loopbit::LoopDetector::process(' "$scratch/loopbit.symbols"
+# Of a class with virtual functions, what its users link.
+grep -qx 'vtable for loopbit::RunInput' "$scratch/loopbit_data.symbols"
 # Of the private headers nothing.
 for hidden in loopbit::HessianPyramid loopbit::report:: '::Impl::'; do
   if grep -F "$hidden" "$scratch"/*.symbols; then

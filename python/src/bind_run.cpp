@@ -236,6 +236,8 @@ void bind_run(py::module_& module) {
   bind_finished_run(module);
   module.def("match_list", &match_list, py::arg("detections"), Free(),
              "Converts detections to a MatchList.");
+  module.def("image_pairs", &image_pairs, py::arg("detections"), Free(),
+             "The loops within this session as lines 'NAME MATCH_NAME', for hloc and COLMAP.");
   module.def("_run", &run_source, py::arg("source"), py::arg("detector"), py::arg("on_detection"),
              py::arg("on_bad_frame"));
   bind_run_folder(module);

@@ -12,8 +12,10 @@
 #include "loopbit/evaluation.hpp"
 #include "loopbit/printable.hpp"
 #include "loopbit/run_record.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
+#include "curve_plot.hpp"
 #include "process.hpp"
 #include "run_list.hpp"
 #include "session.hpp"
@@ -25,6 +27,7 @@ namespace {
 struct CompareFlags {
   std::vector<std::string> runs;
   std::string out;
+  std::string plot;
   TruthFlags truth;
   ReportOptions report;
   bool json = false;
@@ -144,17 +147,26 @@ void print_json(const std::vector<Row>& rows) {
   fmt::print("{}\n", printable_json(text));
 }
 
+void write_plot(const std::string& file, const std::vector<Row>& rows) {
+  std::vector<NamedEvaluation> runs;
+  runs.reserve(rows.size());
+  for (const Row& row : rows) runs.push_back({row.name, row.evaluation});
+  write_file(file, curve_plot(runs));
+}
+
 void compare_command(const CompareFlags& flags) {
   const std::vector<ReportRun> runs = read_runs(flags);
   std::vector<Row> rows;
   rows.reserve(runs.size());
   for (const ReportRun& run : runs) rows.push_back(row_of(run));
   if (!flags.out.empty()) write_report(flags.out, runs, flags.report);
+  if (!flags.plot.empty()) write_plot(flags.plot, rows);
   if (flags.json) {
     print_json(rows);
   } else {
     print_table(rows);
     if (!flags.out.empty()) fmt::print("report     {}\n", printable(flags.out));
+    if (!flags.plot.empty()) fmt::print("plot       {}\n", printable(flags.plot));
   }
   if (flags.open) open_page(flags.out);
 }
@@ -173,6 +185,7 @@ void add_compare(CLI::App& app) {
   CLI::Option* out = command->add_option("--out", flags->out, "Write one page that shows all runs")
                          ->type_name("FILE");
   command->add_flag("--open", flags->open, "Open the page in the browser")->needs(out);
+  add_plot_flag(*command, flags->plot);
   command->add_flag("--json", flags->json, "Print the table as JSON");
   add_report_flag(*command, flags->report);
   flags->truth.add_to(*command);

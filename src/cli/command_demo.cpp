@@ -54,11 +54,13 @@ void check_nothing_is_detected(const DemoFlags& flags) {
   }
 }
 
-void write_images(const World& world, const std::string& folder) {
+void write_images(const World& world, const std::string& folder, bool quiet) {
   {
-    Progress progress(static_cast<std::size_t>(world.options().frames), false);
+    Progress progress(static_cast<std::size_t>(world.options().frames),
+                      {.shown = !quiet, .of_detection = false});
     write_dataset(world, folder, [&](int) { progress.advance(false); });
   }
+  if (quiet) return;
   fmt::print(
       "written    {0}/images ({1} frames of the {2}), {0}/truth.csv, {0}/not_false.csv, "
       "{0}/poses.txt, {0}/times.txt\n",
@@ -80,7 +82,7 @@ int demo_command(DemoFlags& flags, const Arguments& arguments) {
   const auto world = std::make_shared<const World>(options);
   if (!flags.images.empty()) {
     check_nothing_is_detected(flags);
-    write_images(*world, flags.images);
+    write_images(*world, flags.images, flags.session.quiet);
     return success;
   }
   RunRequest& run = flags.session.run;
@@ -107,7 +109,8 @@ void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
                          ->type_name("DIR")
                          ->capture_default_str();
   flags->session.add_to(*command);
-  flags->of_detector = command->get_options([&](CLI::Option* option) { return option != out; });
+  flags->of_detector = command->get_options(
+      [&](CLI::Option* option) { return option != out && !option->check_name("--quiet"); });
   command->add_option("--frames", flags->world.frames, "Frames in the whole drive")
       ->type_name("N")
       ->capture_default_str();

@@ -8,8 +8,10 @@
 #include "loopbit/evaluation.hpp"
 #include "loopbit/printable.hpp"
 #include "loopbit/protocol.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
+#include "curve_plot.hpp"
 #include "run_list.hpp"
 #include "summary.hpp"
 
@@ -21,6 +23,7 @@ constexpr std::size_t kMaxListed = 20;
 struct EvalFlags {
   std::string detections;
   TruthFlags truth;
+  std::string plot;
   bool json = false;
 };
 
@@ -86,6 +89,7 @@ void print_wrong(const std::vector<ReportedMatch>& wrong) {
 void eval_command(const EvalFlags& flags) {
   const ReportRun run = scored_run(flags.detections, flags.truth);
   const Evaluation evaluation = evaluate(run.list, *run.truth, run.evaluation);
+  if (!flags.plot.empty()) write_file(flags.plot, curve_plot({{run.name, evaluation}}));
   if (flags.json) {
     fmt::print("{}\n", to_json(evaluation, true));
     return;
@@ -100,6 +104,7 @@ void eval_command(const EvalFlags& flags) {
   print_sweep(evaluation);
   print_pairs(evaluation.pairs);
   print_wrong(evaluation.wrong_loops);
+  if (!flags.plot.empty()) fmt::print("plot       {}\n", printable(flags.plot));
 }
 
 }  // namespace
@@ -114,6 +119,7 @@ void add_eval(CLI::App& app) {
           "A run folder, or a CSV file of query,match[,score] with or without a header row")
       ->required();
   flags->truth.add_to(*command);
+  add_plot_flag(*command, flags->plot);
   command->add_flag("--json", flags->json, "Print all numbers, wrong loops and the curve as JSON");
   command->footer(list_truth_settings());
   command->callback([flags] { eval_command(*flags); });

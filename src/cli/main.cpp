@@ -107,6 +107,7 @@ int run_command_line(int argc, char** argv) {
   cli::add_demo(app, arguments, exit_code);
   cli::add_query(app, exit_code);
   cli::add_map(app, exit_code);
+  cli::add_pairs(app);
   cli::add_eval(app);
   cli::add_compare(app);
   cli::add_report(app);

@@ -29,8 +29,8 @@ std::string clock_time(double seconds) {
 
 }  // namespace
 
-Progress::Progress(std::optional<std::size_t> total, bool of_detection)
-    : total_(total), of_detection_(of_detection), on_terminal_(isatty(STDERR_FILENO) != 0) {}
+Progress::Progress(std::optional<std::size_t> total, Style style)
+    : total_(total), style_(style), on_terminal_(isatty(STDERR_FILENO) != 0) {}
 
 Progress::~Progress() {
   clear_line();
@@ -43,6 +43,7 @@ Progress::~Progress() {
 void Progress::advance(bool is_loop) {
   ++frames_;
   if (is_loop) ++loops_;
+  if (!style_.shown) return;
   const auto now = Clock::now();
   if (now - last_shown_ < (on_terminal_ ? kTerminalPause : kPlainPause)) return;
   last_shown_ = now;
@@ -67,7 +68,7 @@ std::string Progress::line() const {
   if (total_ && *total_ >= frames_) {
     left = fmt::format(", {} left", clock_time(static_cast<double>(*total_ - frames_) / rate));
   }
-  if (of_detection_) loops = fmt::format(", {} loop{}", loops_, loops_ == 1 ? "" : "s");
+  if (style_.of_detection) loops = fmt::format(", {} loop{}", loops_, loops_ == 1 ? "" : "s");
   if (!on_terminal_) return fmt::format("{}", fmt::join(facts, ""));
 
   // One less than fits, because some terminals wrap a full line.
@@ -89,7 +90,7 @@ std::string Progress::bar(std::size_t room) const {
 }
 
 void Progress::clear_line() const {
-  if (on_terminal_) clear_terminal_line();
+  if (on_terminal_ && style_.shown) clear_terminal_line();
 }
 
 }  // namespace loopbit::cli

@@ -13,8 +13,13 @@ namespace loopbit::cli {
 /// plain line every few seconds.
 class Progress {
  public:
-  /// `total`: number of frames, if known. `of_detection`: also counts loops.
-  explicit Progress(std::optional<std::size_t> total, bool of_detection = true);
+  struct Style {
+    bool shown = true;         ///< false: only bad frames are reported
+    bool of_detection = true;  ///< also counts loops
+  };
+
+  /// `total`: number of frames, if known.
+  Progress(std::optional<std::size_t> total, Style style);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -35,7 +40,7 @@ class Progress {
   void clear_line() const;
 
   const std::optional<std::size_t> total_;
-  const bool of_detection_;
+  const Style style_;
   const bool on_terminal_;
   const Clock::time_point start_ = Clock::now();
   Clock::time_point last_shown_ = start_;

@@ -12,6 +12,7 @@
 #include "loopbit/run_input.hpp"
 
 #include "commands.hpp"
+#include "json_lines.hpp"
 #include "map_output.hpp"
 #include "process.hpp"
 #include "progress.hpp"
@@ -29,14 +30,17 @@ int thread_count(int wanted) {
   return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
-RunOutcome run_with_progress(RunInput& input, const RunRequest& request,
+RunOutcome run_with_progress(RunInput& input, const SessionFlags& flags,
                              const std::atomic<bool>& stop) {
-  Progress progress(input.size());
-  return record_run(
-      input, request,
-      {[&](const Detection& detection) { progress.advance(detection.status == Status::loop); },
-       [&](const std::string& sentence) { progress.report(sentence); }},
-      stop);
+  Progress progress(input.size(), {.shown = !flags.quiet});
+  JsonLines lines;
+  return record_run(input, flags.run,
+                    {[&](const Detection& detection) {
+                       progress.advance(detection.status == Status::loop);
+                       if (flags.json) lines.add(detection);
+                     },
+                     [&](const std::string& sentence) { progress.report(sentence); }},
+                    stop);
 }
 
 }  // namespace
@@ -69,6 +73,10 @@ void SessionFlags::add_to(CLI::App& command) {
       "Store no pictures and write no report.html");
   command.add_flag("--open", open, "Open the report in the browser")->excludes(left_out);
   add_report_flag(command, report);
+  command.add_flag("--json", json,
+                   "Print one JSON object per loop, one per line, as soon as it is found, and a "
+                   "summary as the last line");
+  command.add_flag("--quiet", quiet, "Print no progress and no summary; errors still");
 }
 
 void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb) {
@@ -116,14 +124,18 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   cv::setNumThreads(request.threads);
   if (request.threads > 1) source = prefetch(std::move(source), kFramesReadAhead);
   RunInput frames(std::move(source), input, sampling);
-  const RunOutcome outcome = run_with_progress(frames, request, stop);
+  const RunOutcome outcome = run_with_progress(frames, flags, stop);
   if (!outcome.record.early_end.empty()) {
     tell(fmt::format("loopbit: {}\n", outcome.record.early_end));
   }
   warn_of_damage(request.map, outcome.map_damage);
   const std::string report = request.evidence ? report_in(outcome.folder) : "";
   if (!report.empty()) write_report(report, {report_run(outcome.folder)}, flags.report);
-  print_summary(outcome, report);
+  if (flags.json) {
+    JsonLines::finish(outcome, report);
+  } else if (!flags.quiet) {
+    print_summary(outcome, report);
+  }
   const bool is_cut_off = outcome.record.stopped_by != "end";
   if (outcome.fault && !is_cut_off) throw Error(*outcome.fault);
   if (outcome.fault) tell(fmt::format("loopbit: {}\n", outcome.fault->what()));

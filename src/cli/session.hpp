@@ -23,6 +23,8 @@ struct SessionFlags {
   std::vector<std::string> settings;  ///< "section.field=value"
   int threads = 0;                    ///< at most one a core; 0 = as many
   bool open = false;                  ///< the report, in the browser
+  bool json = false;                  ///< JSON in place of the summary
+  bool quiet = false;                 ///< no progress, no summary
   ReportOptions report;
 
   void add_to(CLI::App& command);
@@ -41,8 +43,8 @@ void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb);
 void add_image_flag(CLI::App& command, int& max_megapixels);
 
 /// Runs a detector over the frames of `input` that `sampling` leaves, as `flags` ask, with progress
-/// on stderr and a summary on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in order.
-/// Throws Error.
+/// on stderr and a summary or JSON on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in
+/// order. Throws Error.
 int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
                 const Sampling& sampling, SessionFlags flags);
 

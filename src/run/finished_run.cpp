@@ -226,4 +226,25 @@ MatchList match_list(const std::vector<Detection>& detections) {
   return list;
 }
 
+std::string image_pairs(const std::vector<Detection>& detections) {
+  const auto name_of = [&](PlaceId frame) {
+    const std::string& name = detections.at(static_cast<std::size_t>(frame)).name;
+    // loops.csv writes other characters as "\x2c".
+    if (name.empty() || name.find(' ') != std::string::npos ||
+        name.find("\\x") != std::string::npos) {
+      throw Error(ErrorKind::input,
+                  fmt::format("Frame {} is called '{}', but a list of pairs needs a name without "
+                              "spaces, commas and quotes: rename the image, and run again.",
+                              frame, name));
+    }
+    return name;
+  };
+  std::string text;
+  for (const Detection& d : detections) {
+    if (d.status != Status::loop || !d.match) continue;
+    text += fmt::format("{} {}\n", name_of(d.frame), name_of(*d.match));
+  }
+  return text;
+}
+
 }  // namespace loopbit

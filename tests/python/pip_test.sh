@@ -14,24 +14,24 @@ root=$(dirname "$(dirname "$(dirname "$(readlink -f "$0")")")")
 rm -rf "$scratch"
 mkdir -p "$scratch/tree"
 # A copy, for setuptools writes into the tree that it builds.
-cp -r "$root"/{CMakeLists.txt,LICENSE,MANIFEST.in,README.md,pyproject.toml,setup.py,cmake,python,src} \
+cp -r "$root"/{CMakeLists.txt,LICENSE,MANIFEST.in,README.md,pyproject.toml,setup.py,cmake,python,src,tools} \
   "$scratch/tree"
 version=$(sed -n 's/^  VERSION //p' "$root/CMakeLists.txt")
 (cd "$scratch/tree" && "$python" setup.py --quiet sdist --dist-dir "$scratch")
 archive=$scratch/loopbit-$version.tar.gz
 tar -xf "$archive" -C "$scratch"
-for part in cmake python src; do
+for part in cmake python src tools; do
   diff -r --exclude='*.egg-info' --exclude=__pycache__ "$scratch/tree/$part" "$scratch/loopbit-$version/$part"
 done
 cmake -S "$scratch/loopbit-$version" -B "$scratch/configured" -G Ninja --log-level=WARNING \
-  -DLOOPBIT_BUILD_PYTHON=ON -DLOOPBIT_BUILD_CLI=OFF -DLOOPBIT_BUILD_TESTS=OFF \
+  -DLOOPBIT_BUILD_PYTHON=ON -DLOOPBIT_BUILD_CLI=ON -DLOOPBIT_BUILD_TESTS=OFF \
   -DLOOPBIT_BUILD_BENCHMARKS=OFF -DPython3_EXECUTABLE="$python"
 
 "$python" -m venv --system-site-packages "$scratch/venv"
 PIP_NO_INDEX=1 PIP_DISABLE_PIP_VERSION_CHECK=1 LOOPBIT_BUILD_DIR=$build \
   "$scratch/venv/bin/pip" install --quiet --no-build-isolation "$archive"
 cd "$scratch"
-"$build/src/cli/loopbit" demo --frames 60 --world spacing_m=4 --world width_px=160 \
+"$scratch/venv/bin/loopbit" demo --frames 60 --world spacing_m=4 --world width_px=160 \
   --world height_px=120 --write-images town 2>progress
 "$scratch/venv/bin/python" - "$version" town/images <<'END'
 import importlib.metadata

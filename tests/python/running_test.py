@@ -42,6 +42,8 @@ def test_finished_run(run):
     assert run.detections[7].name == array["name"][7] == "000007.png"
     assert array["match_name"][0] == ""
     assert loops["match_name"].tolist() == [f"{match:06}.png" for match in loops["match"]]
+    pairs = [line.split() for line in loopbit.image_pairs(run.detections).splitlines()]
+    assert pairs == [[row["name"], row["match_name"]] for row in loops]
 
 
 def test_callbacks(dataset, images, tmp_path):
@@ -197,7 +199,7 @@ RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views":
            "truth_variable": "variable", "poses": "positions_m", "no_report": "evidence"}
 OF_OPTIONS = {"preset", "config", "set"}
 OF_SOURCE = {"every", "limit", "max_megapixels"}
-OF_THE_COMMAND = {"help", "threads", "pictures_mb", "open"}
+OF_THE_COMMAND = {"help", "threads", "pictures_mb", "open", "json", "quiet"}
 
 
 def test_run_folder_has_what_the_command_has(command):

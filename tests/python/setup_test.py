@@ -17,7 +17,10 @@ MODULE = "_loopbit" + sysconfig.get_config_var("EXT_SUFFIX")
 CMAKE = f"""#!/bin/sh
 echo "$@" >>"$ASKED"
 case "$*" in
-  *loopbit_python*) /bin/mkdir -p "$2/python/loopbit" && : >"$2/python/loopbit/{MODULE}" ;;
+  *loopbit_python*)
+    /bin/mkdir -p "$2/python/loopbit" "$2/src/cli"
+    : >"$2/python/loopbit/{MODULE}"
+    : >"$2/src/cli/loopbit" ;;
 esac
 """
 
@@ -40,7 +43,7 @@ def test_the_pybind11_of_pip_is_found_and_nothing_but_cmake_is_needed(tmp_path):
          "--build-lib", tmp_path / "lib"],
         cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "lib/loopbit" / MODULE).exists()
+    assert (tmp_path / "lib/loopbit" / MODULE).exists() and (tmp_path / "lib/loopbit/bin/loopbit").exists()
     configured = asked.read_text().splitlines()[0]
     assert f"-Dpybind11_DIR={package}" in configured.split()
     assert configured.endswith("-DONE=1 -DTWO=a b")

@@ -41,4 +41,8 @@ FinishedRun read_run(const std::string& path);
 /// Converts detections to a MatchList.
 MatchList match_list(const std::vector<Detection>& detections);
 
+/// The loops within this session as lines "NAME MATCH_NAME" with names of images, the form in which
+/// hloc and COLMAP read pairs. Throws Error (kind input) if a name cannot stand in such a line.
+std::string image_pairs(const std::vector<Detection>& detections);
+
 }  // namespace loopbit
