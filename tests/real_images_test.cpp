@@ -133,6 +133,14 @@ TEST(RealImages, DISABLED_ARobotInViewOnACampus) {
   }
 }
 
+TEST(RealImages, PathsByNight) {
+  LOOPBIT_NEEDS_DATA("gardens_point");
+  const auto counts = score("right_then_night", "gardens_point/right_then_night.txt",
+                            read_truth("gardens_point/truth.csv", "gardens_point/not_false.csv"));
+  EXPECT_EQ(counts.wrong, 0);
+  EXPECT_GE(counts.recall(), 0.30);  // geometry alone: 0.005
+}
+
 TEST(RealImages, DriveWithoutRevisitHasNoLoop) {
   LOOPBIT_NEEDS_DATA("kitti03");
   const auto counts = score("kitti03", "kitti03/images", {});

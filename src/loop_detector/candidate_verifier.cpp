@@ -8,6 +8,8 @@
 #include <tuple>
 #include <utility>
 
+#include "voted_paths.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -141,6 +143,11 @@ std::vector<double> CandidateVerifier::shared_around(const Query& query,
     shared.push_back(weights == 0 ? 0.0 : static_cast<double>(sum) / static_cast<double>(weights));
   }
   return shared;
+}
+
+int CandidateVerifier::votes(const Query& query, PlaceId place) {
+  return displacement_votes(query.features, places_.features(place), first_look(query, place),
+                            options_.verification.min_spacing_scales);
 }
 
 void CandidateVerifier::complete(const Query& query, std::vector<VerifiedCandidate>& verified) {

@@ -59,6 +59,9 @@ class CandidateVerifier {
   /// How far a place speaks for those beside it.
   static constexpr int kReach = 2;
 
+  /// See displacement_votes().
+  int votes(const Query& query, PlaceId place);
+
   /// Verifies in full those that verify() left out.
   void complete(const Query& query, std::vector<VerifiedCandidate>& verified);
 

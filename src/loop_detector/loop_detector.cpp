@@ -24,6 +24,7 @@
 #include "known_loops.hpp"
 #include "place_memory.hpp"
 #include "recent_view.hpp"
+#include "voted_paths.hpp"
 #include "workspace.hpp"
 
 namespace loopbit {
@@ -125,6 +126,8 @@ class LoopDetector::Impl {
     PlaceId compared = -1;  ///< the recent place that `work` compares it with
     std::vector<VerifiedCandidate> verified;
     std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
+    VotedPaths::Scores scores;
+    std::vector<VotedPaths::Path> paths;
     Workspaces::Lease work;
   };
 
@@ -174,12 +177,15 @@ class LoopDetector::Impl {
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
     auto candidates = index_.query(seen.content, end, options_.retrieval, nullptr, seen.is_allowed);
+    const std::size_t num_similar = candidates.size();
     add_expected(seen, end, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that geometry and the frames before agree on.
     seen.verified = seen.work->candidates.verify(verified_query(seen), candidates);
     decide(seen, end, detection);
+    follow_paths(seen, candidates, num_similar, end);
+    decide_by_path(seen, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
   }
 
@@ -197,7 +203,8 @@ class LoopDetector::Impl {
   }
 
   /// How each candidate scored: the answer, and then the others in the order of their rank.
-  [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen) const {
+  [[nodiscard]] std::vector<RankedPlace> ranked(Observation& seen,
+                                                const Detection& detection) const {
     seen.work->candidates.complete(verified_query(seen), seen.verified);
     if (seen.best) {
       std::erase_if(seen.verified, [&](const VerifiedCandidate& v) {
@@ -217,6 +224,7 @@ class LoopDetector::Impl {
                         .matches = v.matches,
                         .inliers = v.inliers});
     }
+    if (seen.best) places.front().score = detection.score;
     return places;
   }
 
@@ -234,6 +242,8 @@ class LoopDetector::Impl {
       if (seen.best) seen.verified.push_back(*seen.best);
       agreement.remember(seen.verified);
     }
+    VotedPaths voted_paths = voted_paths_;
+    voted_paths.remember(std::move(seen.scores), seen.paths, seen.look.is_step);
     const cv::Size working_size_px = seen.features.working_size_px;
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
@@ -243,6 +253,7 @@ class LoopDetector::Impl {
     latest_view_inliers_ = seen.context.view_inliers;
     known_loops_.take(found);
     agreement_ = std::move(agreement);
+    voted_paths_ = std::move(voted_paths);
   }
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
@@ -273,6 +284,7 @@ class LoopDetector::Impl {
     if (*place < memory_.session_begin()) return;
     const std::ptrdiff_t steps_ago = step_of(index_.size() - 1) - step_of(*place);
     agreement_.withdraw(step_of(*wrong), steps_ago);
+    voted_paths_ = {};
     if (steps_ago == 0) filter_.reject(*wrong);
   }
 
@@ -512,9 +524,15 @@ class LoopDetector::Impl {
     // Below, a neighbour is no likelier to be right than any other place.
     const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
     if (score() > options_.decision.chance_evidence) best = refined(best, seen, end);
-    seen.best = best;
     detection.score = score();
     detection.status = judged(best, seen);
+    report_match(best, seen, detection);
+  }
+
+  void report_match(const VerifiedCandidate& best, Observation& seen, Detection& detection) const {
+    seen.best = best;
+    detection.match.reset();
+    detection.earlier_match.reset();
     if (best.candidate.place < memory_.session_begin()) {
       detection.earlier_match = memory_.origin(best.candidate.place);
     } else {
@@ -523,6 +541,50 @@ class LoopDetector::Impl {
     detection.similarity = best.candidate.similarity;
     detection.matches = best.matches;
     detection.inliers = best.inliers;
+  }
+
+  /// Scores the candidates and where the paths so far lead. From farther away more of a view looks
+  /// alike than geometry tells, so the recent view counts twice.
+  void follow_paths(Observation& seen, const std::vector<Candidate>& candidates,
+                    std::size_t num_similar, PlaceId end) const {
+    if (options_.decision.min_path_margin == 0) return;
+    const PlaceId limit = std::max(memory_.session_begin(), 2 * end - index_.size());
+    const CandidateVerifier::Query query = verified_query(seen);
+    std::vector<VotedPaths::Votes> votes;
+    const auto look = [&](PlaceId place) {
+      const bool is_known =
+          std::ranges::any_of(votes, [&](const auto& v) { return v.place == place; });
+      if (place < 0 || place >= limit || is_known) return;
+      if (seen.is_allowed && !seen.is_allowed(place)) return;
+      votes.push_back({place, step_of(place), seen.work->candidates.votes(query, place)});
+    };
+    std::size_t num_null = 0;
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      look(candidates[i].place);
+      if (i < num_similar) num_null = votes.size();
+    }
+    for (const PlaceId place : voted_paths_.expected_places()) look(place);
+    seen.scores = VotedPaths::scores(votes, num_null);
+    seen.paths = voted_paths_.paths(seen.scores, seen.look.is_step);
+  }
+
+  /// Where geometry sees no more than chance gives, and so cannot speak for or against a place,
+  /// paths decide.
+  void decide_by_path(Observation& seen, Detection& detection) const {
+    const DecisionOptions& decision = options_.decision;
+    const bool is_decided =
+        detection.status == Status::loop || detection.status == Status::ambiguous;
+    if (is_decided || !seen.best || seen.best->distinct_inliers > decision.chance_evidence) return;
+    const auto best = VotedPaths::best(seen.paths, [this](std::ptrdiff_t step) {
+      return Spot{step, known_loops_.first_visit(step)};
+    });
+    if (!best || best->margin_sigmas < decision.min_path_margin) return;
+    const PlaceId place = best->path.end.place;
+    std::vector<VerifiedCandidate> match{{candidate(place, seen.content), step_of(place)}};
+    seen.work->candidates.complete(verified_query(seen), match);
+    detection.score = decision.min_score * best->margin_sigmas / decision.min_path_margin;
+    detection.status = Status::loop;
+    report_match(match.front(), seen, detection);
   }
 
   LoopDetectorOptions options_;
@@ -535,6 +597,7 @@ class LoopDetector::Impl {
   int latest_view_inliers_ = 0;  ///< see FrameContext
   Agreement agreement_;
   KnownLoops known_loops_;
+  VotedPaths voted_paths_;
   mutable Workspaces workspaces_;
 };
 
@@ -570,7 +633,7 @@ Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timest
   Impl::Observation seen = impl_->observation();
   Detection detection = impl_->detect(image, timestamp_s, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
-  if (ranking) *ranking = impl_->ranked(seen);
+  if (ranking) *ranking = impl_->ranked(seen, detection);
   return detection;
 }
 

@@ -89,6 +89,7 @@ LoopDetectorOptions preset(std::string_view name) {
   options.decision.min_score = 30;
   options.decision.agreement_weight = 0;
   options.decision.followed_ways = 0;
+  options.decision.min_path_margin = 0;
   options.decision.count_matches = true;
   return options;
 }

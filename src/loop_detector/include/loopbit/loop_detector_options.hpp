@@ -39,7 +39,7 @@ struct ExclusionOptions {
   }
 };
 
-/// The one rule that accepts a match: score >= min_score.
+/// The rule that accepts a match: score >= min_score, of geometry or of a path.
 struct DecisionOptions {
   double min_score = 15;
   double full_share = 0.1;
@@ -50,6 +50,7 @@ struct DecisionOptions {
   double agreement_weight = 0.5;
   double agreement_memory = 0.8;
   int followed_ways = 3;
+  double min_path_margin = 2.5;
   bool count_matches = false;
 
   static constexpr auto fields() {
@@ -77,6 +78,11 @@ struct DecisionOptions {
         Field{"followed_ways", &S::followed_ways, 0, 1000,
               "number of paths with most support to follow: the places where they continue are "
               "candidates even if they do not look alike; 0 = none"},
+        Field{
+            "min_path_margin", &S::min_path_margin, 0.0, 1e6,
+            "where geometry sees nothing, by night: the margin, in standard deviations, by which a "
+            "path through the past must have more matches that moved alike than any path "
+            "elsewhere; 0 = geometry alone decides"},
         switch_field("count_matches", &S::count_matches,
                      "the evidence is the number of matches, without geometry, as in the paper")};
   }
