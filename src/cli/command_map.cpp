@@ -149,7 +149,7 @@ int link_command(const std::string& path) {
   std::optional<Progress> progress;
   std::int64_t loops = 0;
   const LinkCounts counts = link_map(path, std::nullopt, [&](const LinkCounts& now) {
-    if (!progress) progress.emplace(static_cast<std::size_t>(now.total_places));
+    if (!progress) progress.emplace(static_cast<std::size_t>(now.total_places), Progress::Style());
     progress->advance(now.loops > loops);
     loops = now.loops;
     return !stop;
