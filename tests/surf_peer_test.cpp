@@ -173,8 +173,8 @@ TEST_P(EveryKernel, CellsAreMeans) {
   Patch patch{};
   // With an even scale and a centre on a pixel, all cells have the same size.
   upright_patch(integral, {.x_px = 150, .y_px = 100, .scale = 4}, kernels(), patch);
-  for (int i = 0; i < static_cast<int>(kCells); ++i) {
-    for (int k = 0; k < static_cast<int>(kCells); ++k) {
+  for (int i = 0; i < static_cast<int>(kPatchCells); ++i) {
+    for (int k = 0; k < static_cast<int>(kPatchCells); ++k) {
       const cv::Rect cell(150 - 42 + 1 + 4 * k, 100 - 42 + 1 + 4 * i, 4, 4);
       EXPECT_NEAR(patch[static_cast<std::size_t>(i) * kCellStride + static_cast<std::size_t>(k)],
                   cv::mean(gray(cell))[0], 1e-3)

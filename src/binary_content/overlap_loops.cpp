@@ -14,13 +14,13 @@ int overlap(const std::uint64_t* a, const std::uint64_t* b) {
   return set;
 }
 
-constexpr OverlapKernels kKernels{max_overlaps_by<overlap>};
+constexpr OverlapKernels kOverlapKernels{max_overlaps_by<overlap>};
 
 }  // namespace
 
 template <InstructionSet>
 const OverlapKernels& OverlapKernels::compiled_for() {
-  return kKernels;
+  return kOverlapKernels;
 }
 template const OverlapKernels&
 OverlapKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();

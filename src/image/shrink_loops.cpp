@@ -14,13 +14,13 @@ void add_pixels(const std::uint8_t* __restrict pixels, std::size_t width, std::u
   }
 }
 
-constexpr ShrinkKernels kKernels{add_pixels};
+constexpr ShrinkKernels kShrinkKernels{add_pixels};
 
 }  // namespace
 
 template <InstructionSet>
 const ShrinkKernels& ShrinkKernels::compiled_for() {
-  return kKernels;
+  return kShrinkKernels;
 }
 template const ShrinkKernels&
 ShrinkKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();

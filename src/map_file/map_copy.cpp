@@ -311,7 +311,7 @@ bool can_be_opened(const std::string& path) {
   }
 }
 
-Error is_there(const std::string& path) {
+Error already_there(const std::string& path) {
   return {ErrorKind::output, fmt::format("'{}' exists; name a new file to recover to.", path)};
 }
 
@@ -321,7 +321,7 @@ void rename_to_new(const std::string& from, const std::string& to) {
   // Not every file system supports RENAME_NOREPLACE.
   if (failed != 0 && errno == EINVAL) failed = rename(from.c_str(), to.c_str());
   if (failed == 0) return;
-  throw errno == EEXIST ? is_there(to) : cannot_write(to, errno);
+  throw errno == EEXIST ? already_there(to) : cannot_write(to, errno);
 }
 
 MapCheck recover_to_new(const std::string& from, const std::string& to) {
@@ -440,7 +440,7 @@ MergeCounts merge_map(const std::string& into, const std::string& from) {
 MapCheck recover_map(const std::string& from, const std::string& to) {
   std::error_code error;
   // A broken symbolic link is not replaced, either.
-  if (fs::exists(fs::symlink_status(to, error))) throw is_there(to);
+  if (fs::exists(fs::symlink_status(to, error))) throw already_there(to);
   // The map gets its name when it is complete, so a kill leaves no half of one.
   const std::string part = to + ".part";
   if (fs::exists(part, error) && is_being_written(part)) {

@@ -9,7 +9,7 @@
 namespace loopbit {
 namespace {
 
-__m256i load(const void* address) {
+__m256i load_bytes(const void* address) {
   return _mm256_loadu_si256(static_cast<const __m256i*>(address));
 }
 
@@ -35,7 +35,7 @@ struct Pair {
                          0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 16);
     const __m256i low_nibbles = _mm256_set1_epi8(15);
     for (std::size_t byte = 0; byte < kPackedBytes; byte += kPackedRun) {
-      const __m256i packed = load(record + byte);
+      const __m256i packed = load_bytes(record + byte);
       const __m256i lower = _mm256_and_si256(packed, low_nibbles);
       const __m256i upper = _mm256_and_si256(_mm256_srli_epi16(packed, 4), low_nibbles);
       __m256i* const part = parts + 2 * byte / kPackedRun;
@@ -46,7 +46,7 @@ struct Pair {
 
   static __m256i beside(__m256i sums, const Parts& parts, const std::uint8_t* query) {
     const auto minimum = [&](std::size_t i) {
-      return _mm256_min_epu8(parts[i], load(query + i * kPackedRun));
+      return _mm256_min_epu8(parts[i], load_bytes(query + i * kPackedRun));
     };
     const auto minima_of_4 = [&](std::size_t i) {
       return _mm256_add_epi8(_mm256_add_epi8(minimum(i), minimum(i + 1)),
@@ -93,8 +93,9 @@ __m256i coarse_sums_of_group(const std::uint8_t* query, const std::uint8_t* grou
     const __m256i query_c = four_counts(query, c);
     const __m256i query_d = four_counts(query, d);
     const auto sums_with = [&](const std::uint8_t* half) {
-      const __m256i both = _mm256_add_epi8(_mm256_min_epu8(load(half + c * kInterleaved), query_c),
-                                           _mm256_min_epu8(load(half + d * kInterleaved), query_d));
+      const __m256i both =
+          _mm256_add_epi8(_mm256_min_epu8(load_bytes(half + c * kInterleaved), query_c),
+                          _mm256_min_epu8(load_bytes(half + d * kInterleaved), query_d));
       return _mm256_maddubs_epi16(both, ones);
     };
     low = _mm256_add_epi16(low, sums_with(group));
@@ -149,13 +150,13 @@ std::size_t select_records(const std::uint16_t* sums, const std::uint16_t* large
   return num_selected;
 }
 
-constexpr BoundKernels kKernels{reaching_queries<Pair>, coarse_sums, select_records};
+constexpr BoundKernels kBoundKernels{reaching_queries<Pair>, coarse_sums, select_records};
 
 }  // namespace
 
 template <InstructionSet>
 const BoundKernels& BoundKernels::compiled_for() {
-  return kKernels;
+  return kBoundKernels;
 }
 template const BoundKernels& BoundKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();
 

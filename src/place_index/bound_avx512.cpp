@@ -138,13 +138,13 @@ std::size_t select_records(const std::uint16_t* sums, const std::uint16_t* large
   return num_selected;
 }
 
-constexpr BoundKernels kKernels{reaching_queries<Pair>, coarse_sums, select_records};
+constexpr BoundKernels kBoundKernels{reaching_queries<Pair>, coarse_sums, select_records};
 
 }  // namespace
 
 template <InstructionSet>
 const BoundKernels& BoundKernels::compiled_for() {
-  return kKernels;
+  return kBoundKernels;
 }
 template const BoundKernels& BoundKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();
 

@@ -22,16 +22,16 @@ namespace loopbit {
 namespace {
 
 /// Sets `seconds` to the time that has passed, when it goes out of scope.
-class Stopwatch {
+class WallClock {
  public:
-  explicit Stopwatch(double& seconds) : seconds_(seconds) {}
-  ~Stopwatch() {
+  explicit WallClock(double& seconds) : seconds_(seconds) {}
+  ~WallClock() {
     seconds_ = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
-  Stopwatch(const Stopwatch&) = delete;
-  Stopwatch& operator=(const Stopwatch&) = delete;
-  Stopwatch(Stopwatch&&) = delete;
-  Stopwatch& operator=(Stopwatch&&) = delete;
+  WallClock(const WallClock&) = delete;
+  WallClock& operator=(const WallClock&) = delete;
+  WallClock(WallClock&&) = delete;
+  WallClock& operator=(WallClock&&) = delete;
 
  private:
   double& seconds_;
@@ -152,7 +152,7 @@ class RecordedRun {
 
   /// The map is saved and closed, even if this fails.
   void detect(const RunListener& listener, const std::atomic<bool>& stop) {
-    const Stopwatch stopwatch(record_.wall_s);
+    const WallClock clock(record_.wall_s);
     const std::shared_ptr<MapWriter> map = std::move(map_);
     LoopDetector detector = std::move(*detector_);
     RunListener recording{.on_detection =

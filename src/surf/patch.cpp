@@ -21,8 +21,8 @@ void turned_patch(const IntegralImage& integral, const Keypoint& keypoint, Patch
   const float cosine = std::cos(keypoint.angle_rad) * keypoint.scale;
   const float sine = std::sin(keypoint.angle_rad) * keypoint.scale;
   const float to_corner = 1.0F - static_cast<float>(side) / 2;
-  for (std::size_t i = 0; i < kCells; ++i) {
-    for (std::size_t k = 0; k < kCells; ++k) {
+  for (std::size_t i = 0; i < kPatchCells; ++i) {
+    for (std::size_t k = 0; k < kPatchCells; ++k) {
       const float along = static_cast<float>(k) - 10.0F;
       const float down = static_cast<float>(i) - 10.0F;
       const float x_px = keypoint.x_px + cosine * along - sine * down + to_corner;

@@ -12,7 +12,7 @@
 namespace loopbit {
 
 /// A descriptor's patch reaches this many scales from its keypoint, along its own axes.
-inline constexpr double kPatchReachScales = kCells / 2.0;
+inline constexpr double kPatchReachScales = kPatchCells / 2.0;
 
 /// Mean grey levels of 21 x 21 cells, a scale wide each, as they lie in memory.
 using Patch = std::array<float, kCellsInMemory>;

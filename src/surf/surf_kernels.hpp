@@ -14,10 +14,10 @@ namespace loopbit {
 inline constexpr float kDescriptorScale = 254.0F;
 /// A descriptor is made of 20 x 20 samples, each of which spans 2 x 2 of 21 x 21 cells.
 inline constexpr std::size_t kSamples = 20;
-inline constexpr std::size_t kCells = kSamples + 1;
+inline constexpr std::size_t kPatchCells = kSamples + 1;
 /// Cells in memory: rows of 21 and padding, and behind the last row as much as a vector may read.
 inline constexpr std::size_t kCellStride = 24;
-inline constexpr std::size_t kCellsInMemory = kCells * kCellStride + 16;
+inline constexpr std::size_t kCellsInMemory = kPatchCells * kCellStride + 16;
 
 /// Hessian responses are computed in runs of at most so many samples.
 inline constexpr std::ptrdiff_t kHessianRun = 320;
@@ -67,8 +67,8 @@ struct SurfKernels {
   /// before and after layers[i], and writes whole blocks of 16.
   void (*maxima_row)(const float* const* layers, std::ptrdiff_t stride, std::ptrdiff_t count,
                      float min_response, std::uint8_t* is_maximum);
-  /// The mean grey levels of kCells x kCells cells around a point, one `scale` in px wide each;
-  /// their edges are rounded to pixels and cut off at the image's. `cells` has room for
+  /// The mean grey levels of kPatchCells x kPatchCells cells around a point, one `scale` in px wide
+  /// each; their edges are rounded to pixels and cut off at the image's. `cells` has room for
   /// kCellsInMemory.
   void (*upright_cells)(const IntegralView& integral, float x_px, float y_px, float scale,
                         float* cells);

@@ -204,14 +204,15 @@ void maxima_row(const float* const* layers, std::ptrdiff_t stride, std::ptrdiff_
   }
 }
 
-/// Lines between cells along one axis, in pixel corners; those after kCells + 1 repeat the last.
+/// Lines between cells along one axis, in pixel corners; those after kPatchCells + 1 repeat the
+/// last.
 constexpr std::size_t kLines = 32;
 
 struct Lines {
   Lines(float center_px, float scale, std::int32_t size) {
     for (std::size_t i = 0; i < kLines; ++i) {
       // The middle of pixel 0 lies between corners 0 and 1; + 0.5 again rounds.
-      const float cells = static_cast<float>(i < kCells ? i : kCells) - 10.5F;
+      const float cells = static_cast<float>(i < kPatchCells ? i : kPatchCells) - 10.5F;
       const float at = center_px + cells * scale + 1.0F;
       const auto end = static_cast<float>(size);
       corners[i] = static_cast<std::int32_t>(at < 0.0F ? 0.0F : (at > end ? end : at));
@@ -236,12 +237,12 @@ void upright_cells(const IntegralView& integral, float x_px, float y_px, float s
   for (std::size_t k = 0; k < kLines; ++k) {
     offsets[k] = (columns.corners[k] >> 1) + (columns.corners[k] & 1) * half;
   }
-  alignas(64) std::uint32_t corners[kCells + 1][kCellStride + 8];
-  for (std::size_t i = 0; i <= kCells; ++i) {
+  alignas(64) std::uint32_t corners[kPatchCells + 1][kCellStride + 8];
+  for (std::size_t i = 0; i <= kPatchCells; ++i) {
     const std::uint32_t* row = integral.corners + rows.corners[i] * integral.stride;
     for (std::size_t k = 0; k <= kCellStride; ++k) corners[i][k] = row[offsets[k]];
   }
-  for (std::size_t i = 0; i < kCells; ++i) {
+  for (std::size_t i = 0; i < kPatchCells; ++i) {
     const std::uint32_t* upper = corners[i];
     const std::uint32_t* lower = corners[i + 1];
     for (std::size_t k = 0; k < kCellStride; ++k) {
@@ -332,14 +333,14 @@ void describe(const float* cells, std::int8_t* descriptor) {
   quantize(values, descriptor);
 }
 
-constexpr SurfKernels kKernels{linear_row, integral_row,  hessian_row,
-                               maxima_row, upright_cells, describe};
+constexpr SurfKernels kSurfKernels{linear_row, integral_row,  hessian_row,
+                                   maxima_row, upright_cells, describe};
 
 }  // namespace
 
 template <InstructionSet>
 const SurfKernels& SurfKernels::compiled_for() {
-  return kKernels;
+  return kSurfKernels;
 }
 template const SurfKernels& SurfKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();
 

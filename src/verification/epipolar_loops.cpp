@@ -156,13 +156,13 @@ EpipolarScore epipolar_score(const float* model, const PointPairs& pairs, float 
   return score;
 }
 
-constexpr EpipolarKernels kKernels{solve_samples, epipolar_score};
+constexpr EpipolarKernels kEpipolarKernels{solve_samples, epipolar_score};
 
 }  // namespace
 
 template <InstructionSet>
 const EpipolarKernels& EpipolarKernels::compiled_for() {
-  return kKernels;
+  return kEpipolarKernels;
 }
 template const EpipolarKernels&
 EpipolarKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();

@@ -8,7 +8,7 @@
 namespace loopbit {
 namespace {
 
-__m256i load(const void* address) {
+__m256i load_descriptors(const void* address) {
   return _mm256_loadu_si256(static_cast<const __m256i*>(address));
 }
 
@@ -52,8 +52,8 @@ struct Lanes {
 void transpose(const std::int8_t* descriptors, __m256i* chunks) {
   __m256i pairs[kLanes];
   for (std::size_t i = 0; i < kLanes; i += 2) {
-    const __m256i a = load(descriptors + i * kDescriptorSize);
-    const __m256i b = load(descriptors + (i + 1) * kDescriptorSize);
+    const __m256i a = load_descriptors(descriptors + i * kDescriptorSize);
+    const __m256i b = load_descriptors(descriptors + (i + 1) * kDescriptorSize);
     pairs[i] = _mm256_unpacklo_epi32(a, b);
     pairs[i + 1] = _mm256_unpackhi_epi32(a, b);
   }
@@ -239,13 +239,13 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   found[1].store(kLanes, nearest);
 }
 
-constexpr MatchKernels kKernels{describe_constants, nearest_two};
+constexpr MatchKernels kMatchKernels{describe_constants, nearest_two};
 
 }  // namespace
 
 template <InstructionSet>
 const MatchKernels& MatchKernels::compiled_for() {
-  return kKernels;
+  return kMatchKernels;
 }
 template const MatchKernels& MatchKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();
 

@@ -58,13 +58,13 @@ void nearest_two(const std::int8_t* descriptors, const std::int8_t* others,
   }
 }
 
-constexpr MatchKernels kKernels{describe_constants, nearest_two};
+constexpr MatchKernels kMatchKernels{describe_constants, nearest_two};
 
 }  // namespace
 
 template <InstructionSet>
 const MatchKernels& MatchKernels::compiled_for() {
-  return kKernels;
+  return kMatchKernels;
 }
 template const MatchKernels& MatchKernels::compiled_for<InstructionSet::LOOPBIT_INSTRUCTION_SET>();
 
