@@ -153,11 +153,11 @@ VotedPaths::Scores VotedPaths::scores(const std::vector<Votes>& votes, std::size
     scores.push_back({v.place, v.step, std::clamp(sigmas, -kMaxSigmas, kMaxSigmas)});
   }
   // The best of each step comes first there.
-  std::ranges::sort(scores, [](const Score& a, const Score& b) {
+  std::sort(scores.begin(), scores.end(), [](const Score& a, const Score& b) {
     return std::tuple(a.step, -a.sigmas, a.place) < std::tuple(b.step, -b.sigmas, b.place);
   });
-  const auto repeats = std::ranges::unique(scores, {}, &Score::step);
-  scores.erase(repeats.begin(), repeats.end());
+  const auto is_same_step = [](const Score& a, const Score& b) { return a.step == b.step; };
+  scores.erase(std::unique(scores.begin(), scores.end(), is_same_step), scores.end());
   return scores;
 }
 
