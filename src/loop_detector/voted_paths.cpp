@@ -72,17 +72,19 @@ std::optional<Bin> bin_of(const Keypoint& a, const Keypoint& b, float bin_px) {
   return is_in(bin.x) && is_in(bin.y) ? std::optional(bin) : std::nullopt;
 }
 
+/// How many displacements fall into each bin, row by row.
+using Displacements = std::array<std::array<int, kBins>, kBins>;
+
 /// The upper left bin of the square of four with most displacements.
-Bin fullest_square(const std::array<int, kBins * kBins>& counts) {
+Bin fullest_square(const Displacements& counts) {
   Bin best;
   int most = 0;
-  for (int y = 0; y + 1 < kBins; ++y) {
-    for (int x = 0; x + 1 < kBins; ++x) {
-      const auto i = static_cast<std::size_t>(y * kBins + x);
-      const int count = counts[i] + counts[i + 1] + counts[i + kBins] + counts[i + kBins + 1];
+  for (std::size_t y = 0; y + 1 < kBins; ++y) {
+    for (std::size_t x = 0; x + 1 < kBins; ++x) {
+      const int count = counts[y][x] + counts[y][x + 1] + counts[y + 1][x] + counts[y + 1][x + 1];
       if (count > most) {
         most = count;
-        best = {x, y};
+        best = {static_cast<int>(x), static_cast<int>(y)};
       }
     }
   }
@@ -116,10 +118,10 @@ int displacement_votes(const Features& query, const Features& place, const First
   };
   const float bin_px = static_cast<float>(query.working_size_px.width) / kBinsPerWidth;
   const std::vector<Match> matches = nearest_matches(query, place, look);
-  std::array<int, kBins * kBins> counts{};
+  Displacements counts{};
   for (const Match& match : matches) {
     const auto bin = bin_of(key(query, match.query), key(place, match.place), bin_px);
-    if (bin) ++counts[static_cast<std::size_t>(bin->y * kBins + bin->x)];
+    if (bin) ++counts[static_cast<std::size_t>(bin->y)][static_cast<std::size_t>(bin->x)];
   }
   const Bin square = fullest_square(counts);
   std::vector<Keypoint> counted;
@@ -166,10 +168,10 @@ double VotedPaths::sum_along(std::ptrdiff_t end, double steps_per_step, bool is_
   double sum = 0;
   // A frame that shows what the last step showed stands in its place.
   std::ptrdiff_t back = is_step ? 0 : -1;
-  for (auto step = steps_.rbegin(); step != steps_.rend(); ++step) {
+  for (std::size_t i = steps_.size(); i-- > 0;) {
     if (++back == 0) continue;
     if (back == kPathSteps) break;
-    sum += score_at(*step, end - std::lround(steps_per_step * static_cast<double>(back)));
+    sum += score_at(steps_[i], end - std::lround(steps_per_step * static_cast<double>(back)));
   }
   return sum;
 }
