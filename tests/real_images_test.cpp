@@ -138,7 +138,7 @@ TEST(RealImages, PathsByNight) {
   const auto counts = score("right_then_night", "gardens_point/right_then_night.txt",
                             read_truth("gardens_point/truth.csv", "gardens_point/not_false.csv"));
   EXPECT_EQ(counts.wrong, 0);
-  EXPECT_GE(counts.recall(), 0.30);  // geometry alone: 0.005
+  EXPECT_GE(counts.recall(), 0.15);  // geometry alone: 0.005
 }
 
 TEST(RealImages, DriveWithoutRevisitHasNoLoop) {

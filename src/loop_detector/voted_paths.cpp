@@ -53,10 +53,12 @@ std::vector<Match> nearest_matches(const Features& query, const Features& place,
   };
   if (look.dark.num_query > 0) offer(look.dark, 0, 0);
   if (look.bright.num_query > 0) offer(look.bright, query.num_dark, place.num_dark);
-  std::erase_if(best, [](const Match& match) { return match.query < 0; });
-  std::sort(best.begin(), best.end(),
-            [](const Match& a, const Match& b) { return a.query < b.query; });
-  return best;
+  std::vector<Match> by_query(query.keypoints.size(), Match{-1, -1});
+  for (const Match& match : best) {
+    if (match.query >= 0) by_query[static_cast<std::size_t>(match.query)] = match;
+  }
+  std::erase_if(by_query, [](const Match& match) { return match.query < 0; });
+  return by_query;
 }
 
 struct Bin {

@@ -50,7 +50,7 @@ struct DecisionOptions {
   double agreement_weight = 0.5;
   double agreement_memory = 0.8;
   int followed_ways = 3;
-  double min_path_margin = 2.5;
+  double min_path_margin = 3.0;
   bool count_matches = false;
 
   static constexpr auto fields() {
