@@ -11,6 +11,7 @@
 #include "loopbit/loop_detector.hpp"
 
 #include "known_loops.hpp"
+#include "map_support.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
@@ -18,17 +19,10 @@ namespace {
 
 constexpr int kPlacesOfLap = 24;
 
-LoopDetectorOptions small_map_options() {
-  LoopDetectorOptions options;
-  options.surf = {.working_area_px = 320 * 240, .max_keypoints = 300};
-  options.decision.full_steps = 1;
-  return options;
-}
-
 cv::Mat1b seen_again(int place) { return view(place, {6, 2}); }
 
 LoopDetector after_a_lap() {
-  LoopDetector detector(small_map_options());
+  LoopDetector detector(fast_options());
   for (int place = 0; place < kPlacesOfLap; ++place) detector.process(view(place));
   return detector;
 }
@@ -122,7 +116,7 @@ TEST(RemovedPlaces, AreNoRivals) {
     view(100)(left).copyTo(picture(left));
     return picture;
   };
-  LoopDetectorOptions options = small_map_options();
+  LoopDetectorOptions options = fast_options();
   options.exclusion.frames = 30;
   LoopDetector detector(options);
   for (int place = 0; place < 60; ++place) {
@@ -142,8 +136,8 @@ TEST(RemovedPlaces, AreNoRivals) {
 TEST(RemovedPlaces, DoNotCutOffTheRecentView) {
   // A camera that passes along one scene, most of which stays in view.
   const cv::Mat1b scene = textured_image({60 * 8 + 320, 240}, 1);
-  LoopDetector whole(small_map_options());
-  LoopDetector culled(small_map_options());
+  LoopDetector whole(fast_options());
+  LoopDetector culled(fast_options());
   for (int frame = 0; frame < 60; ++frame) {
     const cv::Mat1b image = scene(cv::Rect(frame * 8, 0, 320, 240));
     const Detection detection = culled.process(image);

@@ -19,21 +19,13 @@
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
 
+#include "map_support.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
 namespace {
 
 constexpr int kLap = 24;
-
-/// Everything as users have it but max_keypoints and the working size, as the views are small, and
-/// full_steps, as the maps are.
-LoopDetectorOptions fast_options() {
-  LoopDetectorOptions options;
-  options.surf = {.working_area_px = 320 * 240, .max_keypoints = 300};
-  options.decision.full_steps = 1;
-  return options;
-}
 
 /// Only the frame just before is too recent.
 LoopDetectorOptions short_window_options() {

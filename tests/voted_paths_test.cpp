@@ -107,6 +107,15 @@ TEST(VotedPaths, ARivalElsewhereTakesTheMargin) {
   EXPECT_NEAR(after_ten_steps(1.0, 12)->margin_sigmas, 20 / std::sqrt(20.0), 1e-9);
 }
 
+TEST(VotedPaths, ThePlaceBesideIsNoRivalWhateverIsKnownOfIt) {
+  const VotedPaths paths;
+  const VotedPaths::Scores scores{{100, 100, 2}, {105, 105, 2}};
+  const auto best = VotedPaths::best(paths.paths(scores, true), [](std::ptrdiff_t step) {
+    return Spot{step, step == 105 ? 5 : step};
+  });
+  EXPECT_NEAR(best->margin_sigmas, 2 / std::sqrt(20.0), 1e-9);
+}
+
 TEST(VotedPaths, TheFrameItselfMustSpeakForItsPlace) {
   EXPECT_TRUE(after_ten_steps(1.0, 0, 1.0));
   EXPECT_FALSE(after_ten_steps(1.0, 0, 0.9));
@@ -129,7 +138,9 @@ TEST(VotedPaths, APathThatIsNotSeenForOnceIsStillARival) {
 
 TEST(VotedPaths, StandingStillAddsNothing) {
   VotedPaths paths;
-  const VotedPaths::Scores scores{{100, 100, 3}};
+  // Wherever an earlier frame would count, it has a score.
+  VotedPaths::Scores scores;
+  for (int step = 80; step <= 120; ++step) scores.push_back({step, step, 3});
   for (int t = 0; t < 20; ++t) paths.remember(scores, paths.paths(scores, t == 0), t == 0);
   EXPECT_DOUBLE_EQ(paths.paths(scores, false).front().sum, 3.0);
 }

@@ -16,7 +16,6 @@
 #include "loopbit/error.hpp"
 #include "loopbit/map_tools.hpp"
 #include "loopbit/printable.hpp"
-#include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
 #include "map_output.hpp"
@@ -168,12 +167,7 @@ int link_command(const std::string& path) {
 
 void export_command(const std::string& path, ExportFormat format, const std::string& out) {
   MapReader map(path);
-  const std::string text = export_loops(map, format);
-  if (out.empty()) {
-    fmt::print("{}", text);
-  } else {
-    write_file(out, text);
-  }
+  print_or_write(export_loops(map, format), out);
   warn_of_damage(map);
 }
 

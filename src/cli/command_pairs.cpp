@@ -3,12 +3,10 @@
 #include <memory>
 #include <string>
 
-#include <fmt/format.h>
-
 #include "loopbit/finished_run.hpp"
-#include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
+#include "process.hpp"
 
 namespace loopbit::cli {
 namespace {
@@ -19,12 +17,7 @@ struct PairsFlags {
 };
 
 void pairs_command(const PairsFlags& flags) {
-  const std::string pairs = image_pairs(read_run(flags.run).detections);
-  if (flags.out.empty()) {
-    fmt::print("{}", pairs);
-  } else {
-    write_file(flags.out, pairs);
-  }
+  print_or_write(image_pairs(read_run(flags.run).detections), flags.out);
 }
 
 }  // namespace

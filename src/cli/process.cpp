@@ -120,6 +120,14 @@ void flush_stdout() {
   throw cannot_write("standard output", errno != 0 ? errno : EIO);
 }
 
+void print_or_write(const std::string& text, const std::string& file) {
+  if (file.empty()) {
+    fmt::print("{}", text);
+  } else {
+    write_file(file, text);
+  }
+}
+
 const std::atomic<bool>& stop_on_signal() {
   std::signal(SIGINT, request_stop);
   std::signal(SIGTERM, request_stop);

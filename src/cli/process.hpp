@@ -28,6 +28,9 @@ void clear_terminal_line();
 /// Throws Error (kind output) if something that was printed did not reach stdout.
 void flush_stdout();
 
+/// Writes `text` to `file`, or to stdout if that is empty. Throws Error (kind output).
+void print_or_write(const std::string& text, const std::string& file);
+
 /// From now on, a first SIGINT, SIGTERM or SIGHUP turns the result true; a second one ends the
 /// process. SIGHUP stays ignored if it was.
 const std::atomic<bool>& stop_on_signal();

@@ -115,7 +115,7 @@ double score_at(const VotedPaths::Scores& scores, std::ptrdiff_t step) {
 
 int displacement_votes(const Features& query, const Features& place, const FirstLook& look,
                        double min_spacing_scales) {
-  const auto key = [](const Features& f, int i) {
+  const auto key = [](const Features& f, int i) -> const Keypoint& {
     return f.keypoints[static_cast<std::size_t>(i)];
   };
   const float bin_px = static_cast<float>(query.working_size_px.width) / kBinsPerWidth;
@@ -128,7 +128,7 @@ int displacement_votes(const Features& query, const Features& place, const First
   const Bin square = fullest_square(counts);
   std::vector<Keypoint> counted;
   for (const Match& match : matches) {
-    const Keypoint here = key(query, match.query);
+    const Keypoint& here = key(query, match.query);
     const auto bin = bin_of(here, key(place, match.place), bin_px);
     const auto is_in = [](int i, int first) { return first <= i && i <= first + 1; };
     if (!bin || !is_in(bin->x, square.x) || !is_in(bin->y, square.y)) continue;
