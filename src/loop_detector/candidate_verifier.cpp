@@ -109,8 +109,8 @@ void CandidateVerifier::look(Frame& frame) {
   }
 }
 
-/// Of the candidates from `first` to `last`, those with most matches in the first look: a place that
-/// shares keypoints shares strong ones, too.
+/// Of the candidates from `first` to `last`, those with most matches in the first look: a place
+/// that shares keypoints shares strong ones, too.
 void CandidateVerifier::look_closer(Frame& frame, std::size_t first, std::size_t last,
                                     std::size_t most) {
   std::vector<std::size_t> order(last - first);

@@ -17,7 +17,6 @@ constexpr float kMaxScaleRatio = 2.0F;
 constexpr int kBinsPerWidth = 20;
 constexpr int kBins = 2 * kBinsPerWidth + 2;
 
-
 struct Bin {
   int x = 0;
   int y = 0;

@@ -128,7 +128,7 @@ class LoopDetector::Impl {
     std::vector<Keypoint> all_keypoints;  ///< with those of what moves with the camera
     Features features;
     RecentView::Look look;
-    PlaceTest is_allowed;  ///< as a candidate; empty = all places are
+    PlaceTest is_allowed;   ///< as a candidate; empty = all places are
     int view_inliers = 0;   ///< see inlier_worth()
     PlaceId compared = -1;  ///< the recent place that `work` compares it with
     std::vector<VerifiedCandidate> verified;
@@ -486,12 +486,11 @@ class LoopDetector::Impl {
       if (!seen.verified.empty()) decide_by_matches(seen, detection);
       return;
     }
-    seen.update = place_filter_.update(
-        std::move(prior), seen.verified, num_similar, steps_before(end), seen.look.is_step,
-        known_loops_, [&](std::ptrdiff_t step) {
-          const auto place = place_of(step);
-          return place && is_candidate(*place, end, seen);
-        });
+    seen.update = place_filter_.update(std::move(prior), seen.verified, num_similar,
+                                       steps_before(end), known_loops_, [&](std::ptrdiff_t step) {
+                                         const auto place = place_of(step);
+                                         return place && is_candidate(*place, end, seen);
+                                       });
     if (!seen.update.match) return;
     report_match(seen.verified[*seen.update.match], seen, detection);
     detection.score = seen.update.probability;

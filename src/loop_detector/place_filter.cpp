@@ -54,9 +54,13 @@ constexpr double kShownPrior = 5;
 constexpr double kGeometryDensity = 0.5 / 10;
 /// Inliers, votes and the inliers' own spread speak of the same pixels. What they say together
 /// counts less than the product.
-constexpr double kGeometryWeight = 0.6;
-/// Half of what a place shows in one step it shows in the next one, too, right or wrong.
-constexpr double kRepeated = 0.5;
+constexpr double kGeometryWeight = 0.7;
+/// How rare a thing is can be known no better than by one in so many steps: inliers count fully
+/// once the map has so many, and before in proportion to the logarithm.
+constexpr double kFullSteps = 200;
+/// Just beyond chance, wrong places are as frequent as just below: the rate of wrong places counts
+/// fully from so many inliers beyond.
+constexpr double kFullExcess = 4;
 /// No frame can say more.
 constexpr double kMaxLogRatio = 30;
 
@@ -71,8 +75,7 @@ double stabilized(int count) { return std::sqrt(count + 3.0 / 8.0); }
 /// Density of Student's t distribution.
 double student_t(double x, double degrees) {
   return std::exp(std::lgamma((degrees + 1) / 2) - std::lgamma(degrees / 2)) /
-         std::sqrt(degrees * std::numbers::pi) *
-         std::pow(1 + x * x / degrees, -(degrees + 1) / 2);
+         std::sqrt(degrees * std::numbers::pi) * std::pow(1 + x * x / degrees, -(degrees + 1) / 2);
 }
 
 /// Density of a sum of an exponential variable of mean `mean` and a standard normal one.
@@ -83,7 +86,8 @@ double shifted_normal(double x, double mean) {
 
 template <typename Pairs>
 auto find_step(Pairs& pairs, std::ptrdiff_t step) {
-  const auto found = std::ranges::lower_bound(pairs, step, {}, [](const auto& p) { return p.first; });
+  const auto found =
+      std::ranges::lower_bound(pairs, step, {}, [](const auto& p) { return p.first; });
   return found != pairs.end() && found->first == step ? found : pairs.end();
 }
 
@@ -102,8 +106,8 @@ PlaceFilter::Hypothesis& hypothesis_at(std::vector<PlaceFilter::Hypothesis>& pla
 /// What a new frame could return to: each place looked at gets its part of the probability.
 void return_to(const std::vector<PlaceFilter::Observed>& observed, std::ptrdiff_t num_steps,
                PlaceFilter::Belief& prior) {
-  const double share =
-      kReturn * prior.elsewhere() / (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
+  const double share = kReturn * prior.elsewhere() /
+                       (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
   std::ptrdiff_t last = 0;
   bool is_first = true;
   std::vector<std::ptrdiff_t> steps;
@@ -158,16 +162,6 @@ ByStep log_ratios(const std::vector<PlaceFilter::Observed>& observed) {
   return largest_of_steps(observed, [](const auto& o) { return o.log_likelihood_ratio(); });
 }
 
-/// Of the log likelihood ratio of the step before, what the same path showed then.
-double repeated(const ByStep& previous, std::ptrdiff_t step, int direction) {
-  double largest = 0;
-  for (std::ptrdiff_t moved = 0; moved < std::ssize(kMoves); ++moved) {
-    const auto found = find_step(previous, step - direction * moved);
-    if (found != previous.end()) largest = std::max(largest, found->second);
-  }
-  return largest;
-}
-
 /// The step with most probability.
 std::optional<std::ptrdiff_t> peak(const PlaceFilter::Belief& belief) {
   if (belief.places.empty()) return std::nullopt;
@@ -194,22 +188,28 @@ void choose_match(std::ptrdiff_t num_steps, const KnownLoops& loops, PlaceFilter
   update.revisit = 1 - update.belief.elsewhere();
   const auto middle = peak(update.belief);
   if (!middle) {
-    update.match = best_of(update.observed, [](const Observed& /*o*/) { return true; }, ratio);
+    update.match = best_of(
+        update.observed, [](const Observed& /*o*/) { return true; }, ratio);
     return;
   }
   for (const PlaceFilter::Hypothesis& h : update.belief.places) {
     if (is_near(h.step, *middle, loops)) update.probability += h.probability();
   }
   update.match = best_of(
-      update.observed,
-      [&](const Observed& o) { return std::abs(o.step - *middle) <= kMatchSteps; }, ratio);
+      update.observed, [&](const Observed& o) { return std::abs(o.step - *middle) <= kMatchSteps; },
+      [&](const Observed& o) {
+        // One place may show more than the next by chance.
+        const auto at = [&](std::ptrdiff_t step) { return update.belief.at(step); };
+        return at(o.step) + (at(o.step - 1) + at(o.step + 1)) / 2;
+      });
   if (!update.match) {
     update.match = best_of(
         update.observed, [&](const Observed& o) { return is_near(o.step, *middle, loops); }, ratio);
   }
   // A place elsewhere that shows so much by itself that it needs no path shares the view, from
   // closer.
-  const double from_anywhere = kReturn / (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
+  const double from_anywhere =
+      kReturn / (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
   const auto best = best_of(
       update.observed, [](const Observed& /*o*/) { return true; },
       [&](const Observed& o) {
@@ -303,13 +303,16 @@ double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null) const {
 /// known as the map is large. Geometry chose the candidate among all steps, which is why their
 /// number counts.
 double PlaceFilter::geometry_log_ratio(double evidence, std::ptrdiff_t num_steps) const {
-  const double excess = evidence - CandidateVerifier::kChanceInliers;
+  const auto steps = static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps));
+  const double known = std::min(1.0, std::log1p(steps) / std::log1p(kFullSteps));
+  const double excess = known * evidence - CandidateVerifier::kChanceInliers;
   if (excess <= 0) return 0;
   const double rate = tail_.seen / (tail_.seen + tail_.unseen);
-  const double density = rate * tail_.count / tail_.excess *
-                         std::pow(1 + excess / tail_.excess, -(tail_.count + 1));
-  const auto steps = static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps));
-  return kGeometryWeight * std::max(0.0, std::log(steps * kGeometryDensity / density));
+  const double at_beginning =
+      std::log(steps * kGeometryDensity * tail_.excess / (rate * tail_.count));
+  const double growth = (tail_.count + 1) * std::log1p(excess / tail_.excess);
+  return kGeometryWeight *
+         std::max(0.0, growth + std::min(1.0, excess / kFullExcess) * at_beginning);
 }
 
 std::vector<PlaceFilter::Observed> PlaceFilter::observe(
@@ -332,7 +335,7 @@ std::vector<PlaceFilter::Observed> PlaceFilter::observe(
 
 PlaceFilter::Update PlaceFilter::update(
     Belief prior, const std::vector<VerifiedCandidate>& verified, std::size_t num_similar,
-    std::ptrdiff_t num_steps, bool is_step, const KnownLoops& loops,
+    std::ptrdiff_t num_steps, const KnownLoops& loops,
     const std::function<bool(std::ptrdiff_t)>& may_be_at) const {
   Update update;
   update.observed = observe(verified, num_similar, num_steps);
@@ -343,22 +346,13 @@ PlaceFilter::Update PlaceFilter::update(
 
   // Bayes: prior times likelihood ratio, against "somewhere new", whose ratio is 1.
   const ByStep ratios = log_ratios(update.observed);
-  const ByStep& previous = is_step ? latest_ : previous_;
   double sum = prior.elsewhere();
   update.belief = prior;
   for (Hypothesis& h : update.belief.places) {
     const auto found = find_step(ratios, h.step);
-    if (found == ratios.end()) {
-      sum += h.probability();
-      continue;
-    }
-    const auto weighed = [&](int direction) {
-      const double again = std::min(std::max(0.0, found->second),
-                                    repeated(previous, h.step, direction));
-      return std::exp(found->second - kRepeated * again);
-    };
-    h.forward *= weighed(1);
-    h.backward *= weighed(-1);
+    const double ratio = found == ratios.end() ? 1.0 : std::exp(found->second);
+    h.forward *= ratio;
+    h.backward *= ratio;
     sum += h.probability();
   }
   for (Hypothesis& h : update.belief.places) {
@@ -377,7 +371,6 @@ PlaceFilter::Next PlaceFilter::prepare(Update update, bool is_step, const KnownL
   if (is_step) {
     learn(update, loops, next);
     for (const auto& [step, sigmas] : next.sigmas) shown_.try_emplace(step);
-    next.latest = log_ratios(update.observed);
     next.before = std::move(update.prior);
   }
   next.belief = std::move(update.belief);
@@ -418,7 +411,6 @@ void PlaceFilter::commit(Next next) noexcept {
   belief_ = std::move(next.belief);
   if (!next.is_step) return;
   before_ = std::move(next.before);
-  previous_ = std::exchange(latest_, std::move(next.latest));
   tail_ = next.tail;
   if (!next.has_null) return;
   for (std::size_t i = 0; i < next.sigmas.size(); ++i) {

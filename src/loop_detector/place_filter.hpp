@@ -15,9 +15,9 @@
 
 namespace loopbit {
 
-/// The probability that the robot is back at an earlier place, and at which: a discrete Bayes filter
-/// over the steps of the past (changes of view) and "somewhere new". docs/method.md, section 4, has
-/// the model; every constant stands in place_filter.cpp with its reason.
+/// The probability that the robot is back at an earlier place, and at which: a discrete Bayes
+/// filter over the steps of the past (changes of view) and "somewhere new". docs/method.md, section
+/// 4, has the model; every constant stands in place_filter.cpp with its reason.
 ///
 /// Emission: what a candidate shows, displacement votes and geometry, as a likelihood ratio of "the
 /// same place" against "another place". Both nulls are measured on this map: votes against what
@@ -98,7 +98,7 @@ class PlaceFilter {
   /// `verified`: the candidates of the frame; the first `num_similar` look most alike. `num_steps`:
   /// changes of view that may be candidates. `may_be_at(step)`: false for steps that are excluded.
   [[nodiscard]] Update update(Belief prior, const std::vector<VerifiedCandidate>& verified,
-                              std::size_t num_similar, std::ptrdiff_t num_steps, bool is_step,
+                              std::size_t num_similar, std::ptrdiff_t num_steps,
                               const KnownLoops& loops,
                               const std::function<bool(std::ptrdiff_t)>& may_be_at) const;
 
@@ -106,7 +106,6 @@ class PlaceFilter {
   struct Next {
     Belief before = {};
     Belief belief = {};
-    ByStep latest = {};
     ByStep sigmas = {};
     std::vector<double> shown = {};  ///< what is added for each of `sigmas`
     Tail tail = {};
@@ -142,10 +141,8 @@ class PlaceFilter {
   [[nodiscard]] double geometry_log_ratio(double evidence, std::ptrdiff_t num_steps) const;
   void learn(const Update& update, const KnownLoops& loops, Next& next) const;
 
-  Belief before_;    ///< predicted for the last step
-  Belief belief_;    ///< of the last frame
-  ByStep previous_;  ///< log likelihood ratios of the step before the last one
-  ByStep latest_;    ///< of the last step
+  Belief before_;  ///< predicted for the last step
+  Belief belief_;  ///< of the last frame
   ByStep latest_sigmas_;
   std::unordered_map<std::ptrdiff_t, Shown> shown_;  ///< by step
   Tail tail_{1, 10, 10, 10};

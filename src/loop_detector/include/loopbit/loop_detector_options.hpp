@@ -39,18 +39,18 @@ struct ExclusionOptions {
   }
 };
 
-/// The rule that accepts a match: score >= min_score. The score is the probability that the match is
-/// right, measured against the map itself; see docs/method.md, section 4.
+/// The rule that accepts a match: score >= min_score. The score is the probability that the match
+/// is right, measured against the map itself; see docs/method.md, section 4.
 struct DecisionOptions {
-  double min_score = 0.95;
+  double min_score = 0.98;
   bool count_matches = false;
 
   static constexpr auto fields() {
     using S = DecisionOptions;
     return std::tuple{
         Field{"min_score", &S::min_score, 0.0, 1e9,
-              "smallest score of an accepted match: the probability that it is right. 0.95 = a "
-              "wrong loop costs as much as 19 missed ones"},
+              "smallest score of an accepted match: the probability that it is right. 0.98 = a "
+              "wrong loop costs as much as 49 missed ones"},
         switch_field("count_matches", &S::count_matches,
                      "the score is the number of matches, without geometry or frames before, as in "
                      "the paper")};
