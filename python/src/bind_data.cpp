@@ -80,8 +80,8 @@ void bind_topics(py::module_& module) {
       .def_readonly("messages", &Topic::messages, "How many there are.")
       .def_readonly("has_images", &Topic::has_images, "Whether open_source() reads them.")
       .def("__repr__", [](const Topic& self) {
-        return Text{fmt::format("Topic('{}', '{}', {} messages)", self.name, self.type,
-                                self.messages)};
+        return Text{
+            fmt::format("Topic('{}', '{}', {} messages)", self.name, self.type, self.messages)};
       });
   module.def(
       "topics",

@@ -49,8 +49,9 @@ int run_command(RunFlags& flags, const Arguments& arguments) {
   run.arguments = arguments;
   run.scoring = flags.truth.scoring;
   run.poses = flags.truth.poses;
-  return run_session(subsample(open_input(flags.input, flags.topic, flags.max_megapixels), flags.sampling),
-                     flags.input, flags.sampling, flags.session);
+  return run_session(
+      subsample(open_input(flags.input, flags.topic, flags.max_megapixels), flags.sampling),
+      flags.input, flags.sampling, flags.session);
 }
 
 }  // namespace
@@ -59,9 +60,10 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   auto flags = std::make_shared<RunFlags>();
   CLI::App* command = app.add_subcommand("run", "Find the loops in a sequence of images");
   command
-      ->add_option("INPUT", flags->input,
-                   "A folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
-                   "folder, a text file listing images, a video, a ROS bag or MCAP file, or camera:N")
+      ->add_option(
+          "INPUT", flags->input,
+          "A folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
+          "folder, a text file listing images, a video, a ROS bag or MCAP file, or camera:N")
       ->required();
   command
       ->add_option(

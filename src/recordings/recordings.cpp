@@ -135,10 +135,8 @@ RecordingInfo read_info(const fs::path& input, const std::vector<fs::path>& file
   for (const fs::path& path : files) {
     const auto file = open_file(path, "");
     auto contents = file->contents();
-    if (!contents) {
-      contents = count_messages(*file);
-      if (info.damage.empty()) info.damage = damage_of(*file, path);
-    }
+    if (!contents) contents = count_messages(*file);
+    if (info.damage.empty()) info.damage = damage_of(*file, path);
     add_topics(contents->channels, topics);
     times.add_times(contents->first_ns, contents->last_ns);
   }
@@ -248,11 +246,12 @@ void read_frame(const Message& message, const std::string& input, int max_megapi
 class RecordingSource final : public ImageSource {
  public:
   RecordingSource(std::string input, std::vector<fs::path> files, const Topic& topic,
-                  std::string description, int max_megapixels)
+                  const RecordingInfo& info, int max_megapixels)
       : input_(std::move(input)),
         files_(std::move(files)),
         topic_(topic),
-        description_(fmt::format("{}, {}", description, topic.name)),
+        description_(fmt::format("{}, {}", info.description, topic.name)),
+        is_whole_(info.damage.empty()),
         max_megapixels_(max_megapixels) {}
 
   bool next(Frame& frame) override {
@@ -268,6 +267,7 @@ class RecordingSource final : public ImageSource {
   }
 
   [[nodiscard]] std::optional<std::size_t> size() const override {
+    if (!is_whole_) return std::nullopt;
     return static_cast<std::size_t>(topic_.messages);
   }
 
@@ -295,6 +295,7 @@ class RecordingSource final : public ImageSource {
   std::vector<fs::path> files_;
   Topic topic_;
   std::string description_;
+  bool is_whole_;
   int max_megapixels_;
   std::size_t position_ = 0;
   std::unique_ptr<RecordingFile> file_;  ///< the current one, once it is read
@@ -336,9 +337,8 @@ std::unique_ptr<ImageSource> open_recording(const std::string& input, const std:
   images::check_max_megapixels(max_megapixels);
   std::vector<std::filesystem::path> files = recordings::required_files(input);
   const RecordingInfo info = recordings::read_info(input, files);
-  return std::make_unique<recordings::RecordingSource>(input, std::move(files),
-                                                       recordings::choose_topic(input, info, topic),
-                                                       info.description, max_megapixels);
+  return std::make_unique<recordings::RecordingSource>(
+      input, std::move(files), recordings::choose_topic(input, info, topic), info, max_megapixels);
 }
 
 std::unique_ptr<ImageSource> open_input(const std::string& input, const std::string& topic,
