@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# run.sh PYTHON BUILD_DIR LOOPBIT: reads recordings that other libraries wrote. Fetches those for
+# run.sh PYTHON BUILD_DIR LOOPBIT [PYTEST ARGUMENTS]: reads recordings that other libraries wrote. Fetches those for
 # Node.js from the network once, to BUILD_DIR/recordings.
 set -euo pipefail
 
@@ -14,4 +14,4 @@ if ! cmp -s "$here/package-lock.json" "$packages/package-lock.json" || [[ ! -e $
 fi
 export LOOPBIT_COMMAND=$3 LOOPBIT_NODE_MODULES=$packages/node_modules
 export PYTHONPATH=$2/python PYTHONDONTWRITEBYTECODE=1
-exec "$python" -m pytest -q -p no:cacheprovider "$here"
+exec "$python" -m pytest -q -p no:cacheprovider "$here" "${@:4}"
