@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <memory>
 #include <span>
 
@@ -83,13 +84,15 @@ class Bz2 {
 
   Step step(Bytes in, std::span<unsigned char> out) {
     if (!ready_) return {.failed = true};
-    // The library has no const, but does not write what it reads.
-    stream_.next_in = const_cast<char*>(reinterpret_cast<const char*>(in.data()));
+    // The library has no view of constant bytes.
+    const Bytes some = in.first(std::min(in.size(), input_.size()));
+    std::memcpy(input_.data(), some.data(), some.size());
+    stream_.next_in = input_.data();
     stream_.next_out = reinterpret_cast<char*>(out.data());
-    stream_.avail_in = static_cast<unsigned>(in.size());
+    stream_.avail_in = static_cast<unsigned>(some.size());
     stream_.avail_out = static_cast<unsigned>(out.size());
     const int result = BZ2_bzDecompress(&stream_);
-    return {.read = in.size() - stream_.avail_in,
+    return {.read = some.size() - stream_.avail_in,
             .written = out.size() - stream_.avail_out,
             .ended = result == BZ_STREAM_END,
             .failed = result != BZ_OK && result != BZ_STREAM_END};
@@ -97,6 +100,7 @@ class Bz2 {
 
  private:
   bz_stream stream_{};
+  std::vector<char> input_ = std::vector<char>(std::size_t{64} << 10U);
   bool ready_;
 };
 

@@ -128,9 +128,10 @@ bool are_pairs_whole(const Layout& layout, const ImageMessage& message) {
 }
 
 void swap_bytes(cv::Mat& image) {
+  const std::ptrdiff_t row_values = std::ptrdiff_t{image.cols} * image.channels();
   for (int y = 0; y < image.rows; ++y) {
     auto* const row = image.ptr<std::uint16_t>(y);
-    std::transform(row, row + image.cols * image.channels(), row, [](std::uint16_t value) {
+    std::transform(row, row + row_values, row, [](std::uint16_t value) {
       return static_cast<std::uint16_t>(value << 8U | value >> 8U);
     });
   }
@@ -153,11 +154,11 @@ cv::Mat raw_image(const ImageMessage& message, int max_megapixels, const std::st
                      message.width, message.height, message.encoding, message.step,
                      message.data.size()));
   }
-  // OpenCV has no view of constant pixels; this one is only read.
-  auto* const pixels = const_cast<unsigned char*>(message.data.data());
-  cv::Mat image = cv::Mat(static_cast<int>(message.height), static_cast<int>(message.width),
-                          layout.type, pixels, message.step)
-                      .clone();
+  cv::Mat image(static_cast<int>(message.height), static_cast<int>(message.width), layout.type);
+  for (int y = 0; y < image.rows; ++y) {
+    const std::size_t begin = std::size_t{message.step} * static_cast<std::size_t>(y);
+    std::ranges::copy(message.data.subspan(begin, row_bytes), image.ptr(y));
+  }
   constexpr auto kOwnOrder = std::endian::native;
   if (CV_MAT_DEPTH(layout.type) == CV_16U &&
       message.is_big_endian != (kOwnOrder == std::endian::big)) {
