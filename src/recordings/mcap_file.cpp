@@ -11,9 +11,8 @@
 
 #include "loopbit/error.hpp"
 
+#include "chunked_file.hpp"
 #include "compression.hpp"
-#include "record_file.hpp"
-#include "recording_file.hpp"
 
 namespace loopbit::recordings {
 namespace {
@@ -106,8 +105,8 @@ bool add_counts(Bytes statistics, const McapChannels& channels, Contents& conten
 }
 
 /// Of a summary section. Nothing if it does not count the messages of each channel.
-std::optional<Contents> read_summary(Bytes summary) {
-  McapChannels channels;
+/// Adds its channels to `channels`, so that chunks are read whose channels stand in a damaged one.
+std::optional<Contents> read_summary(Bytes summary, McapChannels& channels) {
   Bytes statistics;
   ByteReader reader(summary);
   while (reader.ok() && reader.left() >= kHeadBytes) {
@@ -123,21 +122,25 @@ std::optional<Contents> read_summary(Bytes summary) {
   return contents;
 }
 
-class McapFile final : public RecordingFile {
+class McapFile final : public ChunkedFile {
  public:
   McapFile(const std::filesystem::path& path, std::string topic)
-      : file_(path), topic_(std::move(topic)) {
+      : ChunkedFile(path, std::move(topic), kMcapMagic.size()) {
     if (!std::ranges::equal(file_.read(0, kMcapMagic.size()), kMcapMagic)) {
       throw Error(
           ErrorKind::input,
           fmt::format("'{}' is not an MCAP file of version 0: copy it again, or convert it.",
                       path.string()));
     }
+    const Bytes summary = find_summary();
+    if (!summary.empty()) index_ = read_summary(summary, channels_);
   }
 
-  std::optional<Contents> contents() override {
+ private:
+  /// Empty if there is none.
+  Bytes find_summary() {
     constexpr std::uint64_t kEndBytes = kHeadBytes + kFooterBytes + kMcapMagic.size();
-    if (file_.size() < kEndBytes + kMcapMagic.size()) return std::nullopt;
+    if (file_.size() < kEndBytes + kMcapMagic.size()) return {};
     const std::uint64_t footer_at = file_.size() - kEndBytes;
     const Bytes end = file_.read(footer_at, kEndBytes);
     ByteReader reader(end);
@@ -145,25 +148,12 @@ class McapFile final : public RecordingFile {
     const auto summary_at = reader.number<std::uint64_t>();
     const bool is_footer = head.opcode == Opcode::footer && head.size == kFooterBytes &&
                            std::ranges::equal(end.last(kMcapMagic.size()), kMcapMagic);
-    if (!is_footer || summary_at == 0 || summary_at > footer_at) return std::nullopt;
-    if (footer_at - summary_at > kMaxIndexBytes) return std::nullopt;
-    return read_summary(file_.read(summary_at, static_cast<std::size_t>(footer_at - summary_at)));
+    if (!is_footer || summary_at == 0 || summary_at > footer_at) return {};
+    if (footer_at - summary_at > kMaxIndexBytes) return {};
+    return file_.read(summary_at, static_cast<std::size_t>(footer_at - summary_at));
   }
 
-  bool next(Message& message) override {
-    while (true) {
-      if (next_in_chunk(message)) return true;
-      if (ended_) return false;
-      if (read_record(message)) return true;
-    }
-  }
-
-  [[nodiscard]] std::string damage() const override {
-    return cut_off_ ? cut_off_after(file_.size()) : damaged_chunks(bad_chunks_);
-  }
-
- private:
-  bool next_in_chunk(Message& message) {
+  bool next_in_chunk(Message& message) override {
     while (chunk_.ok() && chunk_.left() >= kHeadBytes) {
       const Head head = read_head(chunk_);
       const Bytes content = chunk_.bytes(head.size);
@@ -172,8 +162,7 @@ class McapFile final : public RecordingFile {
     return false;
   }
 
-  /// Reads a record outside of chunks. True if it is a message that is asked for.
-  bool read_record(Message& message) {
+  bool read_record(Message& message) override {
     ByteReader reader(file_.read(at_, kHeadBytes));
     const Head head = read_head(reader);
     const std::uint64_t left = file_.left(at_ + kHeadBytes);
@@ -185,28 +174,16 @@ class McapFile final : public RecordingFile {
     const std::uint64_t begin = at_;
     at_ += std::min(head.size, left);
     if (head.opcode == Opcode::data_end || head.opcode == Opcode::footer) ended_ = true;
-    if (head.opcode == Opcode::chunk) return read_chunk(begin, head.size), false;
+    if (head.opcode == Opcode::chunk) {
+      begin_chunk(begin, head.size,
+                  [&](Bytes content, bool is_cut) { return unpack(content, is_cut); });
+    }
     if (!is_read(head.opcode) || head.size > kMaxMessageBytes) return false;
     return take(head.opcode, file_.read(begin, static_cast<std::size_t>(head.size)), message);
   }
 
   static bool is_read(Opcode opcode) {
     return opcode == Opcode::schema || opcode == Opcode::channel || opcode == Opcode::message;
-  }
-
-  /// What a file that is cut off has of its last chunk is read, too.
-  void read_chunk(std::uint64_t begin, std::uint64_t size) {
-    const bool is_cut = size > file_.left(begin);
-    cut_off_ = cut_off_ || is_cut;
-    ended_ = ended_ || is_cut;
-    const std::uint64_t there = std::min(size, file_.left(begin));
-    const bool is_good = there <= kMaxChunkBytes &&
-                         unpack(file_.read(begin, static_cast<std::size_t>(there)), is_cut);
-    if (!is_good) {
-      records_.clear();
-      if (!is_cut) ++bad_chunks_;
-    }
-    chunk_ = ByteReader(records_);
   }
 
   /// Fills records_. False if they are damaged, or there is none.
@@ -237,19 +214,10 @@ class McapFile final : public RecordingFile {
     message.time_ns = reader.number<std::uint64_t>();
     reader.number<std::uint64_t>();  // when it was published, by the publisher's clock
     message.data = reader.bytes(reader.left());
-    return reader.ok() && message.channel != nullptr &&
-           (topic_.empty() || message.channel->topic == topic_);
+    return reader.ok() && message.channel != nullptr && is_wanted(*message.channel);
   }
 
-  RecordFile file_;
-  std::string topic_;
-  std::uint64_t at_ = kMcapMagic.size();
   McapChannels channels_;
-  std::vector<unsigned char> records_;  ///< of the chunk
-  ByteReader chunk_{Bytes()};           ///< what is left of them
-  std::size_t bad_chunks_ = 0;
-  bool ended_ = false;
-  bool cut_off_ = false;
 };
 
 }  // namespace

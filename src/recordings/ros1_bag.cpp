@@ -13,9 +13,8 @@
 
 #include "loopbit/error.hpp"
 
+#include "chunked_file.hpp"
 #include "compression.hpp"
-#include "record_file.hpp"
-#include "recording_file.hpp"
 
 namespace loopbit::recordings {
 namespace {
@@ -85,8 +84,9 @@ void add_connection(const Fields& header, Bytes data, Connections& channels) {
 }
 
 /// Of what follows the last chunk. Nothing if it is damaged.
-std::optional<Contents> read_index(Bytes index) {
-  Connections channels;
+/// Adds its connections to `channels`, so that chunks are read whose connections stand in a damaged
+/// one.
+std::optional<Contents> read_index(Bytes index, Connections& channels) {
   std::map<std::uint32_t, std::uint64_t> counts;
   Contents contents;
   ByteReader reader(index);
@@ -107,37 +107,24 @@ std::optional<Contents> read_index(Bytes index) {
   return contents;
 }
 
-class Ros1Bag final : public RecordingFile {
+class Ros1Bag final : public ChunkedFile {
  public:
   Ros1Bag(const std::filesystem::path& path, std::string topic)
-      : file_(path), topic_(std::move(topic)) {
+      : ChunkedFile(path, std::move(topic), kBagMagic.size()) {
     check_version(path);
     const Bytes head = file_.read(at_, kMaxHeaderBytes);
     const Fields header(ByteReader(head).counted_bytes());
-    index_at_ = header.op() == Op::bag_header ? header.number<std::uint64_t>("index_pos") : 0;
-    if (header.text("encryptor").empty()) return;
-    throw Error(
-        ErrorKind::input,
-        fmt::format("Bag '{}' is encrypted: decrypt it with 'rosbag decrypt'.", path.string()));
-  }
-
-  std::optional<Contents> contents() override {
-    const std::uint64_t bytes = index_at_ == 0 ? 0 : file_.left(index_at_);
-    if (bytes == 0 || bytes > kMaxIndexBytes) return std::nullopt;
-    return read_index(file_.read(index_at_, static_cast<std::size_t>(bytes)));
-  }
-
-  bool next(Message& message) override {
-    while (true) {
-      if (next_in_chunk(message)) return true;
-      if (ended_) return false;
-      if (read_record(message)) return true;
+    const bool is_header = header.op() == Op::bag_header;
+    const auto index_at = is_header ? header.number<std::uint64_t>("index_pos") : 0;
+    if (!header.text("encryptor").empty()) {
+      throw Error(
+          ErrorKind::input,
+          fmt::format("Bag '{}' is encrypted: decrypt it with 'rosbag decrypt'.", path.string()));
     }
-  }
-
-  [[nodiscard]] std::string damage() const override {
-    const bool has_no_index = index_at_ == 0 || file_.left(index_at_) == 0;
-    return cut_off_ || has_no_index ? cut_off_after(file_.size()) : damaged_chunks(bad_chunks_);
+    const std::uint64_t index_bytes = file_.left(index_at);
+    cut_off_ = index_at == 0 || index_bytes == 0;
+    if (cut_off_ || index_bytes > kMaxIndexBytes) return;
+    index_ = read_index(file_.read(index_at, static_cast<std::size_t>(index_bytes)), channels_);
   }
 
  private:
@@ -151,7 +138,7 @@ class Ros1Bag final : public RecordingFile {
                             is_old ? "convert it with 'rosbag fix'" : "copy it again"));
   }
 
-  bool next_in_chunk(Message& message) {
+  bool next_in_chunk(Message& message) override {
     while (chunk_.ok() && chunk_.left() > 0) {
       const Fields header(chunk_.counted_bytes());
       const Bytes data = chunk_.counted_bytes();
@@ -160,9 +147,8 @@ class Ros1Bag final : public RecordingFile {
     return false;
   }
 
-  /// Reads a record outside of chunks. True if it is a message that is asked for. A recorder that
-  /// was killed leaves those of its last chunk there.
-  bool read_record(Message& message) {
+  /// A recorder that was killed leaves the messages of its last chunk outside of chunks.
+  bool read_record(Message& message) override {
     if (file_.left(at_) == 0) {
       ended_ = true;
       return false;
@@ -182,7 +168,10 @@ class Ros1Bag final : public RecordingFile {
       cut_off_ = ended_ = true;
       return false;
     }
-    if (header.op() == Op::chunk) return read_chunk(header, begin, size), false;
+    if (header.op() == Op::chunk) {
+      begin_chunk(begin, size,
+                  [&](Bytes content, bool is_cut) { return unpack(header, content, is_cut); });
+    }
     const bool is_read = header.op() == Op::message || header.op() == Op::connection;
     if (!is_read || size > kMaxMessageBytes) return false;
     return take(header, file_.read(begin, static_cast<std::size_t>(size)), message);
@@ -197,25 +186,11 @@ class Ros1Bag final : public RecordingFile {
     return size;
   }
 
-  /// What a bag that is cut off has of its last chunk is read, too.
-  void read_chunk(const Fields& header, std::uint64_t begin, std::uint64_t size) {
-    const std::uint64_t there = std::min(size, file_.left(begin));
-    const bool is_cut = there < size;
-    cut_off_ = cut_off_ || is_cut;
-    ended_ = ended_ || is_cut;
+  bool unpack(const Fields& header, Bytes content, bool is_cut) {
     const auto compression = compression_of(header.text("compression"));
-    const auto unpacked = header.number<std::uint32_t>("size");
-    records_.clear();
-    bool is_good = compression && there <= kMaxChunkBytes && unpacked <= kMaxChunkBytes;
-    if (is_good) {
-      const Bytes stored = file_.read(begin, static_cast<std::size_t>(there));
-      is_good = decompress(*compression, stored, unpacked, records_);
-    }
-    if (!is_good && !is_cut) {
-      records_.clear();
-      ++bad_chunks_;
-    }
-    chunk_ = ByteReader(records_);
+    const auto size = header.number<std::uint32_t>("size");
+    if (!compression || size > kMaxChunkBytes) return false;
+    return decompress(*compression, content, size, records_) || is_cut;
   }
 
   /// True if the record is a message that is asked for.
@@ -225,20 +200,11 @@ class Ros1Bag final : public RecordingFile {
     const auto channel = channels_.find(header.number<std::uint32_t>("conn"));
     if (channel == channels_.end()) return false;
     message = {&channel->second, header.time_ns("time"), data};
-    return topic_.empty() || channel->second.topic == topic_;
+    return is_wanted(channel->second);
   }
 
-  RecordFile file_;
-  std::string topic_;
-  std::uint64_t at_ = kBagMagic.size();
-  std::uint64_t index_at_ = 0;  ///< 0 in a bag that was not closed
   Connections channels_;
-  std::vector<unsigned char> header_;   ///< of the record
-  std::vector<unsigned char> records_;  ///< of the chunk
-  ByteReader chunk_{Bytes()};           ///< what is left of them
-  std::size_t bad_chunks_ = 0;
-  bool ended_ = false;
-  bool cut_off_ = false;
+  std::vector<unsigned char> header_;  ///< of the record
 };
 
 }  // namespace
