@@ -93,6 +93,7 @@ std::optional<Contents> read_index(Bytes index, Connections& channels) {
   while (reader.ok() && reader.left() > 0) {
     const Fields header(reader.counted_bytes());
     const Bytes data = reader.counted_bytes();
+    if (!reader.ok()) return std::nullopt;
     if (header.op() == Op::connection) add_connection(header, data, channels);
     if (header.op() != Op::chunk_info) continue;
     contents.add_times(header.time_ns("start_time"), header.time_ns("end_time"));
@@ -102,7 +103,7 @@ std::optional<Contents> read_index(Bytes index, Connections& channels) {
       counts[connection] += pairs.number<std::uint32_t>();
     }
   }
-  if (!reader.ok() || channels.empty()) return std::nullopt;
+  if (channels.empty()) return std::nullopt;
   for (const auto& [id, channel] : channels) contents.channels.push_back({channel, counts[id]});
   return contents;
 }
