@@ -4,28 +4,56 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/verification.hpp"
 
-#include "agreement.hpp"
 #include "distinctness.hpp"
 #include "known_loops.hpp"
 
 namespace loopbit {
 
-/// Step 3 for the candidates of one frame after another. A first look matches only the strongest
-/// keypoints of each; the few that it puts first are matched in full, and their geometry is sought
-/// while it can change the decision. Others are looked at closer only where they may have what a
-/// promising candidate has.
+/// What matching and epipolar geometry found for one candidate.
+struct CandidateGeometry {
+  int matches = 0;
+  int inliers = 0;
+  int distinct_inliers = 0;
+  double inlier_worth = 1;  ///< 0 to 1, see inlier_worth()
+  double distinctness = 1;  ///< 0 to 1, see distinctness()
+
+  /// That it shows the same place, in distinct inliers that count in full.
+  [[nodiscard]] double evidence() const { return distinct_inliers * inlier_worth * distinctness; }
+};
+
+/// One candidate of one frame.
+struct VerifiedCandidate {
+  Candidate candidate;
+  std::ptrdiff_t step = 0;  ///< the candidate's position along the path, see RecentView::step_of
+  int votes = 0;            ///< see displacement_votes()
+  std::optional<CandidateGeometry> geometry = std::nullopt;  ///< if it was looked at closer
+};
+
+/// What one distinct inlier counts, 0 to 1. `explained_share`: see there. `view_inliers`: distinct
+/// inliers that the query shares with the change of view before, which is what can be recognised of
+/// it: the same number found elsewhere says less of a view that has more.
+double inlier_worth(double explained_share, int view_inliers);
+
+/// Step 3 for the candidates of one frame. A first look matches the strongest keypoints of each and
+/// counts displacement votes; the few that it puts first are matched in full, with their geometry.
+/// Others are looked at closer only where they may have what a promising candidate has. Keeps
+/// nothing from frame to frame but its memory.
 class CandidateVerifier {
  public:
+  /// Evidence up to this number of inliers is chance: 7 matches always have a geometry.
+  static constexpr double kChanceInliers = 8;
+
   struct Query {
     const Features& features;
-    bool is_step = true;  ///< it changes the view, see Agreement::score
-    FrameContext context;
+    int view_inliers = 0;  ///< see inlier_worth()
+    bool closely = false;  ///< the first look matches all keypoints, not only the strongest
   };
 
   /// What is known of places.
@@ -35,76 +63,40 @@ class CandidateVerifier {
   };
 
   /// Keeps the references.
-  CandidateVerifier(const LoopDetectorOptions& options, Places places, const Agreement& agreement,
+  CandidateVerifier(const LoopDetectorOptions& options, Places places,
                     const KnownLoops& known_loops);
 
-  /// The candidates, in their order. Those left out have no inliers, which changes nothing now, and
-  /// adds nothing to the support of later matches.
+  /// The candidates, in their order. The first `num_similar` look most alike, the others are where
+  /// the robot is expected; the best few of both are looked at closer.
   std::vector<VerifiedCandidate> verify(const Query& query,
-                                        const std::vector<Candidate>& candidates);
+                                        const std::vector<Candidate>& candidates,
+                                        std::size_t num_similar);
 
-  /// The one with most inliers of `candidate`, one of those that verify() returned for this query,
-  /// and of the places `around` it: all are the same place, or none.
-  VerifiedCandidate closest(const Query& query, const VerifiedCandidate& candidate,
-                            const std::vector<VerifiedCandidate>& verified,
-                            std::vector<Candidate> around);
-
-  /// The same evidence, and of the places next to `candidate` the one that is nearest as far as all
-  /// of them tell. `around`: the places that may be candidates, in order, `candidate` among them,
-  /// kReach beyond those that may be the answer on either side, where there are so many.
-  VerifiedCandidate located(const Query& query, const VerifiedCandidate& candidate,
-                            const std::vector<VerifiedCandidate>& verified,
-                            const std::vector<Candidate>& around);
-
-  /// How far a place speaks for those beside it.
-  static constexpr int kReach = 2;
-
-  /// See displacement_votes().
-  int votes(const Query& query, PlaceId place);
-
-  /// Verifies in full those that verify() left out.
+  /// Matches in full those that verify() left out.
   void complete(const Query& query, std::vector<VerifiedCandidate>& verified);
 
  private:
-  struct Look {
-    PlaceId place = 0;
-    FirstLook found;
-  };
+  /// The candidates of one frame and what was found for each.
+  struct Frame;
 
+  void look(Frame& frame);
+  void look_closer(Frame& frame, std::size_t first, std::size_t last, std::size_t most);
+  void look_at_others(Frame& frame);
+  void verify_in_full(Frame& frame, std::size_t i);
+  CandidateGeometry geometry_of(const Query& query, PlaceId place, const FirstLook& look,
+                                Verification& result);
   [[nodiscard]] Spot spot_of(const VerifiedCandidate& candidate) const;
-  std::vector<double> shared_around(const Query& query, const std::vector<Candidate>& around);
-  [[nodiscard]] std::vector<VerifiedCandidate> unverified(
-      const std::vector<Candidate>& candidates) const;
-  const FirstLook& first_look(const Query& query, PlaceId place);
-  std::vector<std::size_t> by_first_look(const Query& query,
-                                         const std::vector<VerifiedCandidate>& verified);
-  void match(const Query& query, VerifiedCandidate& candidate, Verification& result);
-  Verification& match_once(const Query& query, const std::vector<VerifiedCandidate>& verified,
-                           VerifiedCandidate& candidate);
-  void find_geometry(const Query& query, VerifiedCandidate& candidate, Verification& result);
-  void find_distinctness(VerifiedCandidate& candidate, const Verification& result) const;
-  [[nodiscard]] double highest_score(const Query& query, VerifiedCandidate candidate) const;
-  void look_closer(const Query& query, std::span<const std::size_t> order,
-                   std::vector<VerifiedCandidate>& verified);
-  void look_at_others(const Query& query, std::span<const std::size_t> order,
-                      std::vector<VerifiedCandidate>& verified);
-  void note_promising(const VerifiedCandidate& candidate, const Verification& result);
-  [[nodiscard]] bool is_elsewhere(const VerifiedCandidate& candidate) const;
-  [[nodiscard]] std::size_t num_shared(const std::vector<Match>& matches) const;
-  void note_sightings(const std::vector<VerifiedCandidate>& verified);
+  [[nodiscard]] bool is_elsewhere(const Frame& frame, const VerifiedCandidate& candidate) const;
+  void find_distinctness(Frame& frame) const;
 
   const LoopDetectorOptions& options_;
   Places places_;
-  const Agreement& agreement_;
   const KnownLoops& known_loops_;
   Verifier verifier_;
-  std::vector<Verification> verifications_;  ///< of the candidates of this frame
-  Verification verification_;                ///< of a place beside one of them
-  std::vector<Look> looks_;                  ///< the first ones are of this frame
-  std::size_t num_looks_ = 0;
-  std::vector<Spot> promising_;          ///< where promising candidates stand
-  std::vector<int> promising_features_;  ///< of the query: inliers of one of them, in order
-  std::vector<Sighting> sightings_;      ///< none if no candidate is promising
+  Verifier thorough_verifier_;  ///< its first look matches all keypoints
+  std::vector<FirstLook> looks_;
+  std::vector<Verification> verifications_;
+  Verification verification_;
 };
 
 }  // namespace loopbit

@@ -35,6 +35,11 @@ void KnownLoops::remove(std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
   take(others);
 }
 
+std::optional<std::ptrdiff_t> KnownLoops::first_visit_of(std::ptrdiff_t step) const {
+  const auto found = loops_.find(step);
+  return found == loops_.end() ? std::nullopt : std::optional(found->second.first_visit);
+}
+
 std::ptrdiff_t KnownLoops::first_visit(std::ptrdiff_t step) const {
   std::ptrdiff_t nearest = kMaxStepsToLoop + 1;
   std::ptrdiff_t first = step;

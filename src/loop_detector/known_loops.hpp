@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 
 namespace loopbit {
 
@@ -24,6 +25,9 @@ class KnownLoops {
   /// The step of the first visit to the place that `step` shows, as far as loops at most 10 steps
   /// away tell; else `step` itself. Logarithmic in the loops.
   [[nodiscard]] std::ptrdiff_t first_visit(std::ptrdiff_t step) const;
+
+  /// The same step if `step` itself was found to be a revisit.
+  [[nodiscard]] std::optional<std::ptrdiff_t> first_visit_of(std::ptrdiff_t step) const;
 
  private:
   struct Loop {

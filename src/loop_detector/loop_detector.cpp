@@ -18,13 +18,12 @@
 #include "loopbit/error.hpp"
 #include "loopbit/gray_image.hpp"
 
-#include "agreement.hpp"
 #include "attached_parts.hpp"
 #include "candidate_filter.hpp"
 #include "known_loops.hpp"
+#include "place_filter.hpp"
 #include "place_memory.hpp"
 #include "recent_view.hpp"
-#include "voted_paths.hpp"
 #include "workspace.hpp"
 
 namespace loopbit {
@@ -46,9 +45,18 @@ class Stopwatch {
   Clock::time_point start_ = Clock::now();
 };
 
-Status reason_of_rejection(const VerifiedCandidate& best, const VerificationOptions& options) {
+/// Paths worth looking at, even where they do not look alike.
+constexpr std::size_t kFollowedPaths = 3;
+constexpr double kMinFollowedProbability = 1e-4;
+/// On each, the places up to so many steps away.
+constexpr std::ptrdiff_t kFollowedReach = 2;
+/// A frame is compared with all its keypoints if the robot is at an earlier place with this
+/// probability, so that most new places cost little.
+constexpr double kWorthACloserLook = 0.1;
+
+Status reason_of_rejection(const CandidateGeometry& best, const VerificationOptions& options) {
   if (best.matches < options.min_matches) return Status::few_matches;
-  return best.evidence() == 0 ? Status::no_geometry : Status::low_score;
+  return best.inliers == 0 ? Status::no_geometry : Status::low_score;
 }
 
 /// Inliers that moved between two images. Those that did not may be the robot itself, dirt on the
@@ -96,7 +104,6 @@ class LoopDetector::Impl {
         filter_({[this](PlaceId place) { return origin(place); },
                  [this](const SessionFrame& at) { return find(at); },
                  [this](PlaceId place) { return spot_of(place); }}),
-        agreement_(options.decision),
         workspaces_([this] { return make_workspace(); }) {
     validate(options);
     memory_.check_options(options);
@@ -122,12 +129,12 @@ class LoopDetector::Impl {
     Features features;
     RecentView::Look look;
     PlaceTest is_allowed;  ///< as a candidate; empty = all places are
-    FrameContext context;
+    int view_inliers = 0;   ///< see inlier_worth()
     PlaceId compared = -1;  ///< the recent place that `work` compares it with
     std::vector<VerifiedCandidate> verified;
-    std::optional<VerifiedCandidate> best;  ///< of them and their neighbours
-    VotedPaths::Scores scores;
-    std::vector<VotedPaths::Path> paths;
+    std::optional<VerifiedCandidate> best;  ///< of them
+    bool closely = false;                   ///< see CandidateVerifier::Query
+    PlaceFilter::Update update;
     Workspaces::Lease work;
   };
 
@@ -172,20 +179,20 @@ class LoopDetector::Impl {
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, detection.timestamp_s);
     seen.is_allowed = filter_.test(allowed, seen.look.is_step);
-    seen.context = {steps_before(end), view_inliers(seen)};
+    seen.view_inliers = view_inliers(seen);
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
     auto candidates = index_.query(seen.content, end, options_.retrieval, nullptr, seen.is_allowed);
     const std::size_t num_similar = candidates.size();
-    add_expected(seen, end, candidates);
+    PlaceFilter::Belief prior = place_filter_.predict(seen.look.is_step);
+    add_expected(seen, prior, end, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
-    // Step 3: the one that geometry and the frames before agree on.
-    seen.verified = seen.work->candidates.verify(verified_query(seen), candidates);
-    decide(seen, end, detection);
-    follow_paths(seen, candidates, num_similar, end);
-    decide_by_path(seen, detection);
+    // Step 3: the one that features, geometry and the frames before agree on.
+    seen.closely = 1 - prior.elsewhere() >= kWorthACloserLook;
+    seen.verified = seen.work->candidates.verify(verified_query(seen), candidates, num_similar);
+    decide(seen, std::move(prior), num_similar, end, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
   }
 
@@ -212,17 +219,17 @@ class LoopDetector::Impl {
       });
     }
     std::stable_sort(seen.verified.begin(), seen.verified.end(),
-                     [&](const auto& a, const auto& b) { return rank(a, seen) > rank(b, seen); });
+                     [&](const auto& a, const auto& b) { return score(a, seen) > score(b, seen); });
     // First, whatever those that were left out turn out to have.
     if (seen.best) seen.verified.insert(seen.verified.begin(), *seen.best);
     std::vector<RankedPlace> places;
     places.reserve(seen.verified.size());
     for (const VerifiedCandidate& v : seen.verified) {
       places.push_back({.place = origin(v.candidate.place),
-                        .score = agreement_.score(v, seen.look.is_step),
+                        .score = score(v, seen),
                         .similarity = v.candidate.similarity,
-                        .matches = v.matches,
-                        .inliers = v.inliers});
+                        .matches = v.geometry->matches,
+                        .inliers = v.geometry->inliers});
     }
     if (seen.best) places.front().score = detection.score;
     return places;
@@ -237,23 +244,17 @@ class LoopDetector::Impl {
       const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
       found.add(seen.look.is_step ? latest + 1 : latest, seen.best->step);
     }
-    Agreement agreement = agreement_;
-    if (seen.look.is_step) {
-      if (seen.best) seen.verified.push_back(*seen.best);
-      agreement.remember(seen.verified);
-    }
-    VotedPaths voted_paths = voted_paths_;
-    voted_paths.remember(std::move(seen.scores), seen.paths, seen.look.is_step);
+    PlaceFilter::Next next =
+        place_filter_.prepare(std::move(seen.update), seen.look.is_step, known_loops_);
     const cv::Size working_size_px = seen.features.working_size_px;
     const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
     recent_view_.remember(place, seen.look);
     if (seen.look.is_step) filter_.note_change_of_view();
     memory_.leave_behind([&](PlaceId removed) { return recent_view_.is_in_view(removed); });
     attached_parts_.remember(working_size_px, seen.all_keypoints);
-    latest_view_inliers_ = seen.context.view_inliers;
+    latest_view_inliers_ = seen.view_inliers;
     known_loops_.take(found);
-    agreement_ = std::move(agreement);
-    voted_paths_ = std::move(voted_paths);
+    place_filter_.commit(std::move(next));
   }
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
@@ -282,10 +283,8 @@ class LoopDetector::Impl {
     if (!place || !wrong) return;
     known_loops_.remove(step_of(*place), step_of(*wrong));
     if (*place < memory_.session_begin()) return;
-    const std::ptrdiff_t steps_ago = step_of(index_.size() - 1) - step_of(*place);
-    agreement_.withdraw(step_of(*wrong), steps_ago);
-    voted_paths_ = {};
-    if (steps_ago == 0) filter_.reject(*wrong);
+    place_filter_.withdraw(step_of(*wrong), known_loops_);
+    if (step_of(index_.size() - 1) == step_of(*place)) filter_.reject(*wrong);
   }
 
   /// Frames of this session.
@@ -295,8 +294,7 @@ class LoopDetector::Impl {
  private:
   [[nodiscard]] std::unique_ptr<Workspace> make_workspace() const {
     return std::make_unique<Workspace>(
-        options_, memory_, [this](PlaceId place) { return step_of(place); }, agreement_,
-        known_loops_);
+        options_, memory_, [this](PlaceId place) { return step_of(place); }, known_loops_);
   }
 
   [[nodiscard]] const Features& features(PlaceId place, const Observation& seen) const {
@@ -376,7 +374,7 @@ class LoopDetector::Impl {
   }
 
   static CandidateVerifier::Query verified_query(const Observation& seen) {
-    return {seen.features, seen.look.is_step, seen.context};
+    return {seen.features, seen.view_inliers, seen.closely};
   }
 
   /// The paper knows nothing of them.
@@ -401,7 +399,7 @@ class LoopDetector::Impl {
     });
   }
 
-  /// See FrameContext. A frame that shows the same as the last step can recognise as much.
+  /// See inlier_worth(). A frame that shows the same as the last step can recognise as much.
   [[nodiscard]] int view_inliers(Observation& seen) const {
     if (options_.decision.count_matches || recent_view_.empty()) return 0;
     if (!seen.look.is_step) return latest_view_inliers_;
@@ -438,14 +436,10 @@ class LoopDetector::Impl {
     return std::max(memory_.session_begin(), std::min(first, index_.size() - exclusion.min_frames));
   }
 
-  using Rank = std::tuple<bool, double, int, double>;
-
-  /// Which of several candidates is the place. Agreement over time says that the robot is back; of
-  /// places that are accepted, the one that shows most itself is where.
-  [[nodiscard]] Rank rank(const VerifiedCandidate& v, const Observation& seen) const {
-    const double score = agreement_.score(v, seen.look.is_step);
-    const bool is_accepted = score >= options_.decision.min_score;
-    return {is_accepted, is_accepted ? v.evidence() : score, v.matches, v.candidate.similarity};
+  /// See RankedPlace::score.
+  [[nodiscard]] double score(const VerifiedCandidate& v, const Observation& seen) const {
+    if (options_.decision.count_matches) return v.geometry ? v.geometry->matches : 0;
+    return seen.update.belief.at(v.step);
   }
 
   [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const {
@@ -453,138 +447,85 @@ class LoopDetector::Impl {
             similarity(content, index_.content(place), options_.retrieval.shift_tolerance_columns)};
   }
 
-  /// The places below `end` that lie at most `radius` from `middle` and are allowed, in order.
-  static std::vector<PlaceId> around(PlaceId middle, int radius, PlaceId end,
-                                     const PlaceTest& is_allowed) {
-    const PlaceId first = std::max(0, middle - radius);
-    const PlaceId last = std::min(end - 1, middle + radius);
-    std::vector<PlaceId> places;
-    for (PlaceId place = first; place <= last; ++place) {
-      if (!is_allowed || is_allowed(place)) places.push_back(place);
-    }
-    return places;
+  /// The first place of a step.
+  [[nodiscard]] std::optional<PlaceId> place_of(std::ptrdiff_t step) const {
+    return step < 0 ? memory_.place_of(step) : recent_view_.place_of(step);
+  }
+
+  [[nodiscard]] bool is_candidate(PlaceId place, PlaceId end, const Observation& seen) const {
+    return place < end && (!seen.is_allowed || seen.is_allowed(place));
   }
 
   /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
   /// while.
-  void add_expected(const Observation& seen, PlaceId end,
+  void add_expected(const Observation& seen, const PlaceFilter::Belief& prior, PlaceId end,
                     std::vector<Candidate>& candidates) const {
-    const int radius = options_.retrieval.min_spacing;
-    for (const PlaceId followed : agreement_.followed_places()) {
-      for (const PlaceId place : around(followed, radius, end, seen.is_allowed)) {
-        const bool is_there =
-            std::any_of(candidates.begin(), candidates.end(),
-                        [&](const Candidate& other) { return other.place == place; });
+    if (options_.decision.count_matches) return;
+    for (const std::ptrdiff_t middle :
+         PlaceFilter::likeliest(prior, kMinFollowedProbability, kFollowedPaths)) {
+      for (std::ptrdiff_t step = middle - kFollowedReach; step <= middle + kFollowedReach; ++step) {
+        const auto place = place_of(step);
+        if (!place || !is_candidate(*place, end, seen)) continue;
+        const bool is_there = std::ranges::any_of(
+            candidates, [&](const Candidate& other) { return other.place == *place; });
         if (is_there) continue;
-        const Candidate expected = candidate(place, seen.content);
+        const Candidate expected = candidate(*place, seen.content);
         // Nothing is like a frame that could not be read.
         if (expected.similarity > 0) candidates.push_back(expected);
       }
     }
   }
 
-  [[nodiscard]] std::vector<Candidate> candidates_around(PlaceId middle, int radius, PlaceId end,
-                                                         const Observation& seen) const {
-    std::vector<Candidate> candidates;
-    for (const PlaceId place : around(middle, radius, end, seen.is_allowed)) {
-      candidates.push_back(candidate(place, seen.content));
-    }
-    return candidates;
-  }
-
-  /// The best candidate, refined: candidates stand apart, so a place beside it may be the best.
-  [[nodiscard]] VerifiedCandidate refined(const VerifiedCandidate& best, const Observation& seen,
-                                          PlaceId end) const {
-    const CandidateVerifier::Query query = verified_query(seen);
-    const int radius = options_.retrieval.min_spacing;
-    const VerifiedCandidate closest = seen.work->candidates.closest(
-        query, best, seen.verified, candidates_around(best.candidate.place, radius, end, seen));
-    return seen.work->candidates.located(
-        query, closest, seen.verified,
-        candidates_around(closest.candidate.place, radius + CandidateVerifier::kReach, end, seen));
-  }
-
-  [[nodiscard]] Status judged(VerifiedCandidate best, const Observation& seen) const {
-    const auto accepted = [&] {
-      return agreement_.score(best, seen.look.is_step) >= options_.decision.min_score;
-    };
-    if (accepted()) return Status::loop;
-    best.distinctness = 1;
-    return accepted() ? Status::ambiguous : reason_of_rejection(best, options_.verification);
-  }
-
-  void decide(Observation& seen, PlaceId end, Detection& detection) const {
+  void decide(Observation& seen, PlaceFilter::Belief prior, std::size_t num_similar, PlaceId end,
+              Detection& detection) const {
+    const DecisionOptions& decision = options_.decision;
     if (seen.verified.empty()) {
       detection.status = end == 0 ? Status::no_earlier_place : Status::no_similar_place;
+    }
+    if (decision.count_matches) {
+      if (!seen.verified.empty()) decide_by_matches(seen, detection);
       return;
     }
-    auto best = *std::max_element(
-        seen.verified.begin(), seen.verified.end(),
-        [&](const auto& a, const auto& b) { return rank(a, seen) < rank(b, seen); });
-    // Below, a neighbour is no likelier to be right than any other place.
-    const auto score = [&] { return agreement_.score(best, seen.look.is_step); };
-    if (score() > options_.decision.chance_evidence) best = refined(best, seen, end);
-    detection.score = score();
-    detection.status = judged(best, seen);
-    report_match(best, seen, detection);
+    seen.update = place_filter_.update(
+        std::move(prior), seen.verified, num_similar, steps_before(end), seen.look.is_step,
+        known_loops_, [&](std::ptrdiff_t step) {
+          const auto place = place_of(step);
+          return place && is_candidate(*place, end, seen);
+        });
+    if (!seen.update.match) return;
+    report_match(seen.verified[*seen.update.match], seen, detection);
+    detection.score = seen.update.probability;
+    detection.status = seen.update.probability >= decision.min_score ? Status::loop
+                       : seen.update.revisit >= decision.min_score
+                           ? Status::ambiguous
+                           : reason_of_rejection(*seen.best->geometry, options_.verification);
   }
 
-  void report_match(const VerifiedCandidate& best, Observation& seen, Detection& detection) const {
-    seen.best = best;
-    detection.match.reset();
-    detection.earlier_match.reset();
-    if (best.candidate.place < memory_.session_begin()) {
-      detection.earlier_match = memory_.origin(best.candidate.place);
-    } else {
-      detection.match = best.candidate.place - memory_.session_begin();
-    }
-    detection.similarity = best.candidate.similarity;
-    detection.matches = best.matches;
-    detection.inliers = best.inliers;
-  }
-
-  /// Scores the candidates and where the paths so far lead. From farther away more of a view looks
-  /// alike than geometry tells, so the recent view counts twice.
-  void follow_paths(Observation& seen, const std::vector<Candidate>& candidates,
-                    std::size_t num_similar, PlaceId end) const {
-    if (options_.decision.min_path_margin == 0) return;
-    const PlaceId limit = std::max(memory_.session_begin(), 2 * end - index_.size());
-    const CandidateVerifier::Query query = verified_query(seen);
-    std::vector<VotedPaths::Votes> votes;
-    const auto look = [&](PlaceId place) {
-      const bool is_known =
-          std::ranges::any_of(votes, [&](const auto& v) { return v.place == place; });
-      if (place < 0 || place >= limit || is_known) return;
-      if (seen.is_allowed && !seen.is_allowed(place)) return;
-      votes.push_back({place, step_of(place), seen.work->candidates.votes(query, place)});
-    };
-    std::size_t num_null = 0;
-    for (std::size_t i = 0; i < candidates.size(); ++i) {
-      look(candidates[i].place);
-      if (i < num_similar) num_null = votes.size();
-    }
-    for (const PlaceId place : voted_paths_.expected_places()) look(place);
-    seen.scores = VotedPaths::scores(votes, num_null);
-    seen.paths = voted_paths_.paths(seen.scores, seen.look.is_step);
-  }
-
-  /// Where geometry sees no more than chance gives, and so cannot speak for or against a place,
-  /// paths decide.
-  void decide_by_path(Observation& seen, Detection& detection) const {
-    const DecisionOptions& decision = options_.decision;
-    const bool is_decided =
-        detection.status == Status::loop || detection.status == Status::ambiguous;
-    if (is_decided || !seen.best || seen.best->distinct_inliers > decision.chance_evidence) return;
-    const auto best = VotedPaths::best(seen.paths, [this](std::ptrdiff_t step) {
-      return Spot{step, known_loops_.first_visit(step)};
+  /// As in the paper.
+  void decide_by_matches(Observation& seen, Detection& detection) const {
+    const auto& best = *std::ranges::max_element(seen.verified, {}, [&](const auto& v) {
+      return std::pair(score(v, seen), v.candidate.similarity);
     });
-    if (!best || best->margin_sigmas < decision.min_path_margin) return;
-    const PlaceId place = best->path.end.place;
-    std::vector<VerifiedCandidate> match{{candidate(place, seen.content), step_of(place)}};
+    report_match(best, seen, detection);
+    detection.score = score(*seen.best, seen);
+    detection.status = detection.score >= options_.decision.min_score
+                           ? Status::loop
+                           : reason_of_rejection(*seen.best->geometry, options_.verification);
+  }
+
+  void report_match(VerifiedCandidate best, Observation& seen, Detection& detection) const {
+    std::vector<VerifiedCandidate> match{std::move(best)};
     seen.work->candidates.complete(verified_query(seen), match);
-    detection.score = decision.min_score * best->margin_sigmas / decision.min_path_margin;
-    detection.status = Status::loop;
-    report_match(match.front(), seen, detection);
+    seen.best = match.front();
+    const PlaceId place = seen.best->candidate.place;
+    if (place < memory_.session_begin()) {
+      detection.earlier_match = memory_.origin(place);
+    } else {
+      detection.match = place - memory_.session_begin();
+    }
+    detection.similarity = seen.best->candidate.similarity;
+    detection.matches = seen.best->geometry->matches;
+    detection.inliers = seen.best->geometry->inliers;
   }
 
   LoopDetectorOptions options_;
@@ -594,10 +535,9 @@ class LoopDetector::Impl {
   RecentView recent_view_;
   AttachedParts attached_parts_;
   CandidateFilter filter_;
-  int latest_view_inliers_ = 0;  ///< see FrameContext
-  Agreement agreement_;
+  int latest_view_inliers_ = 0;  ///< see inlier_worth()
   KnownLoops known_loops_;
-  VotedPaths voted_paths_;
+  PlaceFilter place_filter_;
   mutable Workspaces workspaces_;
 };
 

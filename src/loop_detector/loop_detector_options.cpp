@@ -87,9 +87,6 @@ LoopDetectorOptions preset(std::string_view name) {
   options.surf.upright = false;
   options.verification.max_closer_looks = options.retrieval.max_candidates;
   options.decision.min_score = 30;
-  options.decision.agreement_weight = 0;
-  options.decision.followed_ways = 0;
-  options.decision.min_path_margin = 0;
   options.decision.count_matches = true;
   return options;
 }

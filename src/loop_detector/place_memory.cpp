@@ -39,6 +39,14 @@ std::ptrdiff_t PlaceMemory::step_of(PlaceId place) const {
   return step - earlier_.back().step - kStepsBetweenSessions;
 }
 
+std::optional<PlaceId> PlaceMemory::place_of(std::ptrdiff_t step) const {
+  if (earlier_.empty()) return std::nullopt;
+  const std::ptrdiff_t wanted = step + earlier_.back().step + kStepsBetweenSessions;
+  const auto found = std::ranges::lower_bound(earlier_, wanted, {}, &EarlierPlace::step);
+  if (found == earlier_.end() || found->step != wanted) return std::nullopt;
+  return static_cast<PlaceId>(found - earlier_.begin());
+}
+
 void PlaceMemory::add(const Detection& detection, const BinaryContent& content, Features features,
                       const cv::Mat& image) {
   if (!map_) {

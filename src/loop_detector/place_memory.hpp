@@ -63,6 +63,8 @@ class PlaceMemory {
   /// Where along the paths of all sessions it lies, counted in changes of view: negative, and far
   /// from any step of another session.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
+  /// The reverse: the first place of a step, if an earlier session has it. Logarithmic.
+  [[nodiscard]] std::optional<PlaceId> place_of(std::ptrdiff_t step) const;
 
   /// Throws as MapStorage::add does, and stays as it was.
   void add(const Detection& detection, const BinaryContent& content, Features features,

@@ -41,4 +41,9 @@ std::ptrdiff_t RecentView::step_of(PlaceId place) const {
   return std::upper_bound(steps_.begin(), steps_.end(), place) - steps_.begin() - 1;
 }
 
+std::optional<PlaceId> RecentView::place_of(std::ptrdiff_t step) const {
+  if (step < 0 || step >= std::ssize(steps_)) return std::nullopt;
+  return steps_[static_cast<std::size_t>(step)];
+}
+
 }  // namespace loopbit

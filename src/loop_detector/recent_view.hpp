@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "loopbit/place_index.hpp"
@@ -48,6 +49,9 @@ class RecentView {
 
   /// Where along the path `place` lies, counted in steps.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
+
+  /// The first place of a step, if there is such a step.
+  [[nodiscard]] std::optional<PlaceId> place_of(std::ptrdiff_t step) const;
 
  private:
   std::vector<PlaceId> steps_;

@@ -21,8 +21,7 @@ namespace loopbit {
 /// The working memory of one call of a detector.
 struct Workspace {
   Workspace(const LoopDetectorOptions& options, const PlaceMemory& memory,
-            std::function<std::ptrdiff_t(PlaceId)> step_of, const Agreement& agreement,
-            const KnownLoops& known_loops)
+            std::function<std::ptrdiff_t(PlaceId)> step_of, const KnownLoops& known_loops)
       : surf(options.surf),
         verifier(options.verification),
         candidates(options,
@@ -30,7 +29,7 @@ struct Workspace {
                       return memory.features(place, held);
                     },
                     std::move(step_of)},
-                   agreement, known_loops) {}
+                   known_loops) {}
 
   SurfExtractor surf;
   Verifier verifier;

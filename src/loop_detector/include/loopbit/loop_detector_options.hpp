@@ -39,52 +39,21 @@ struct ExclusionOptions {
   }
 };
 
-/// The rule that accepts a match: score >= min_score, of geometry or of a path.
+/// The rule that accepts a match: score >= min_score. The score is the probability that the match is
+/// right, measured against the map itself; see docs/method.md, section 4.
 struct DecisionOptions {
-  double min_score = 15;
-  double full_share = 0.1;
-  int full_steps = 200;
-  int full_view_inliers = 40;
-  bool distinctness = true;
-  double chance_evidence = 6.0;
-  double agreement_weight = 0.5;
-  double agreement_memory = 0.8;
-  int followed_ways = 3;
-  double min_path_margin = 3.0;
+  double min_score = 0.95;
   bool count_matches = false;
 
   static constexpr auto fields() {
     using S = DecisionOptions;
     return std::tuple{
-        Field{"min_score", &S::min_score, 1.0, 1e9, "smallest score of an accepted match"},
-        Field{
-            "full_share", &S::full_share, 0.0, 1.0,
-            "an inlier counts fully if this share of the features around the inliers are inliers; "
-            "below it counts sqrt(share / full_share); 0 = always fully"},
-        Field{"full_steps", &S::full_steps, 1, 1'000'000,
-              "inliers count fully once the map holds this many view changes; before, in "
-              "proportion to the logarithm; 1 = always fully"},
-        Field{"full_view_inliers", &S::full_view_inliers, 1, 1'000'000,
-              "if a frame shares n distinct inliers with the previous view change and n is larger, "
-              "an inlier counts full_view_inliers / n, but at least half"},
-        switch_field("distinctness", &S::distinctness,
-                     "an inlier counts less if other places have it, too"),
-        Field{"chance_evidence", &S::chance_evidence, 0.0, 1000.0,
-              "evidence up to this value is chance and adds no support"},
-        Field{"agreement_weight", &S::agreement_weight, 0.0, 1.0,
-              "weight of the support from earlier view changes in the score; 0 = each frame alone"},
-        Field{"agreement_memory", &S::agreement_memory, 0.0, 0.99,
-              "share of the support that remains after each further view change"},
-        Field{"followed_ways", &S::followed_ways, 0, 1000,
-              "number of paths with most support to follow: the places where they continue are "
-              "candidates even if they do not look alike; 0 = none"},
-        Field{
-            "min_path_margin", &S::min_path_margin, 0.0, 1e6,
-            "where geometry sees nothing, by night: the margin, in standard deviations, by which a "
-            "path through the past must have more matches that moved alike than any path "
-            "elsewhere; 0 = geometry alone decides"},
+        Field{"min_score", &S::min_score, 0.0, 1e9,
+              "smallest score of an accepted match: the probability that it is right. 0.95 = a "
+              "wrong loop costs as much as 19 missed ones"},
         switch_field("count_matches", &S::count_matches,
-                     "the evidence is the number of matches, without geometry, as in the paper")};
+                     "the score is the number of matches, without geometry or frames before, as in "
+                     "the paper")};
   }
 };
 

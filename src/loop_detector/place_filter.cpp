@@ -1,0 +1,448 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "place_filter.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <utility>
+
+namespace loopbit {
+namespace {
+
+/// A robot follows an earlier path for a hundred changes of view on average, and is somewhere new
+/// for as long in between. Ten times more or less changes little.
+constexpr double kLeave = 0.01;
+constexpr double kReturn = 0.01;
+/// A path is followed at 0, 1 or 2 steps per step, most likely at the speed of before.
+constexpr std::array kMoves{0.25, 0.5, 0.25};
+/// Robots seldom turn round on a path.
+constexpr double kTurn = 0.01;
+/// Steps at most so far apart show the same place.
+constexpr std::ptrdiff_t kOnePathSteps = 12;
+/// The match is the one that shows most among places so close to the likeliest step.
+constexpr std::ptrdiff_t kMatchSteps = 3;
+/// Laps known to be one place share a fifth of their probability with each step.
+constexpr double kShareOfLaps = 0.2;
+/// Hypotheses below this are dropped: some twenty frames of evidence could not bring them back.
+constexpr double kMinProbability = 1e-6;
+
+/// A median and a deviation of fewer places tell little.
+constexpr std::size_t kMinNull = 8;
+/// The square root of a count plus 3/8 has this deviation by chance (Anscombe 1948).
+constexpr double kMinDeviation = 0.5;
+constexpr double kDeviationsPerMedian = 1.4826;  // of a normal distribution
+constexpr double kMinSigmas = -3;
+constexpr double kMaxSigmas = 12;
+/// A true place stands out by some three deviations on average, which is what a frame at night
+/// shows; one by day shows more.
+constexpr double kMeanSigmas = 3;
+/// Degrees of freedom of the null, at most: what happens in one of many places cannot be learned
+/// from thirty.
+constexpr std::size_t kMaxDegrees = 20;
+/// One frame changes what is known of a place by no more.
+constexpr double kMaxLearned = 3;
+/// A place's own mean counts once it was seen by some frames.
+constexpr double kShownPrior = 5;
+
+/// A true place has some ten inliers beyond chance where geometry sees any, which is every second
+/// frame.
+constexpr double kGeometryDensity = 0.5 / 10;
+/// Inliers, votes and the inliers' own spread speak of the same pixels. What they say together
+/// counts less than the product.
+constexpr double kGeometryWeight = 0.6;
+/// Half of what a place shows in one step it shows in the next one, too, right or wrong.
+constexpr double kRepeated = 0.5;
+/// No frame can say more.
+constexpr double kMaxLogRatio = 30;
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double stabilized(int count) { return std::sqrt(count + 3.0 / 8.0); }
+
+/// Density of Student's t distribution.
+double student_t(double x, double degrees) {
+  return std::exp(std::lgamma((degrees + 1) / 2) - std::lgamma(degrees / 2)) /
+         std::sqrt(degrees * std::numbers::pi) *
+         std::pow(1 + x * x / degrees, -(degrees + 1) / 2);
+}
+
+/// Density of a sum of an exponential variable of mean `mean` and a standard normal one.
+double shifted_normal(double x, double mean) {
+  const double tail = 0.5 * std::erfc((1 / mean - x) / std::numbers::sqrt2);
+  return std::exp(-x / mean + 0.5 / (mean * mean)) * tail / mean;
+}
+
+template <typename Pairs>
+auto find_step(Pairs& pairs, std::ptrdiff_t step) {
+  const auto found = std::ranges::lower_bound(pairs, step, {}, [](const auto& p) { return p.first; });
+  return found != pairs.end() && found->first == step ? found : pairs.end();
+}
+
+bool is_near(std::ptrdiff_t a, std::ptrdiff_t b, const KnownLoops& loops) {
+  return std::abs(a - b) <= kOnePathSteps ||
+         is_same_place({a, loops.first_visit(a)}, {b, loops.first_visit(b)});
+}
+
+PlaceFilter::Hypothesis& hypothesis_at(std::vector<PlaceFilter::Hypothesis>& places,
+                                       std::ptrdiff_t step) {
+  auto found = std::ranges::lower_bound(places, step, {}, &PlaceFilter::Hypothesis::step);
+  if (found == places.end() || found->step != step) found = places.insert(found, {step});
+  return *found;
+}
+
+/// What a new frame could return to: each place looked at gets its part of the probability.
+void return_to(const std::vector<PlaceFilter::Observed>& observed, std::ptrdiff_t num_steps,
+               PlaceFilter::Belief& prior) {
+  const double share =
+      kReturn * prior.elsewhere() / (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
+  std::ptrdiff_t last = 0;
+  bool is_first = true;
+  std::vector<std::ptrdiff_t> steps;
+  steps.reserve(observed.size());
+  for (const auto& o : observed) steps.push_back(o.step);
+  std::sort(steps.begin(), steps.end());
+  for (const std::ptrdiff_t step : steps) {
+    if (!is_first && step == last) continue;
+    is_first = false;
+    last = step;
+    PlaceFilter::Hypothesis& at = hypothesis_at(prior.places, step);
+    at.forward += share;
+    at.backward += share;
+  }
+}
+
+/// Laps through one place are one place: what is known of one is known of the other.
+void share_among_laps(const KnownLoops& loops, std::vector<PlaceFilter::Hypothesis>& places) {
+  std::vector<std::ptrdiff_t> steps;
+  steps.reserve(places.size());
+  for (const auto& at : places) steps.push_back(at.step);
+  for (const std::ptrdiff_t step : steps) {
+    const auto first = loops.first_visit_of(step);
+    if (!first) continue;
+    const PlaceFilter::Hypothesis other = hypothesis_at(places, *first);
+    PlaceFilter::Hypothesis& here = hypothesis_at(places, step);
+    const double forward = kShareOfLaps * (other.forward - here.forward);
+    const double backward = kShareOfLaps * (other.backward - here.backward);
+    here.forward += forward;
+    here.backward += backward;
+    PlaceFilter::Hypothesis& there = hypothesis_at(places, *first);
+    there.forward -= forward;
+    there.backward -= backward;
+  }
+}
+
+using ByStep = PlaceFilter::ByStep;
+
+/// The largest value of each step, in their order.
+template <typename Value>
+ByStep largest_of_steps(const std::vector<PlaceFilter::Observed>& observed, const Value& value) {
+  ByStep largest;
+  for (const PlaceFilter::Observed& o : observed) largest.emplace_back(o.step, value(o));
+  std::ranges::sort(largest, std::greater{});
+  const auto repeats = [](const auto& a, const auto& b) { return a.first == b.first; };
+  largest.erase(std::unique(largest.begin(), largest.end(), repeats), largest.end());
+  std::ranges::reverse(largest);
+  return largest;
+}
+
+ByStep log_ratios(const std::vector<PlaceFilter::Observed>& observed) {
+  return largest_of_steps(observed, [](const auto& o) { return o.log_likelihood_ratio(); });
+}
+
+/// Of the log likelihood ratio of the step before, what the same path showed then.
+double repeated(const ByStep& previous, std::ptrdiff_t step, int direction) {
+  double largest = 0;
+  for (std::ptrdiff_t moved = 0; moved < std::ssize(kMoves); ++moved) {
+    const auto found = find_step(previous, step - direction * moved);
+    if (found != previous.end()) largest = std::max(largest, found->second);
+  }
+  return largest;
+}
+
+/// The step with most probability.
+std::optional<std::ptrdiff_t> peak(const PlaceFilter::Belief& belief) {
+  if (belief.places.empty()) return std::nullopt;
+  return std::ranges::max_element(belief.places, {}, &PlaceFilter::Hypothesis::probability)->step;
+}
+
+/// Of the candidates for which `is_eligible(o)`, the one with the largest `value(o)`.
+template <typename Eligible, typename Value>
+std::optional<std::size_t> best_of(const std::vector<PlaceFilter::Observed>& observed,
+                                   const Eligible& is_eligible, const Value& value) {
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < observed.size(); ++i) {
+    if (!is_eligible(observed[i])) continue;
+    if (!best || value(observed[i]) > value(observed[*best])) best = i;
+  }
+  return best;
+}
+
+/// Which candidate is the match, and how probable: all hypotheses around the likeliest step and on
+/// laps through the same place count for it.
+void choose_match(std::ptrdiff_t num_steps, const KnownLoops& loops, PlaceFilter::Update& update) {
+  using Observed = PlaceFilter::Observed;
+  const auto ratio = [](const Observed& o) { return o.log_likelihood_ratio(); };
+  update.revisit = 1 - update.belief.elsewhere();
+  const auto middle = peak(update.belief);
+  if (!middle) {
+    update.match = best_of(update.observed, [](const Observed& /*o*/) { return true; }, ratio);
+    return;
+  }
+  for (const PlaceFilter::Hypothesis& h : update.belief.places) {
+    if (is_near(h.step, *middle, loops)) update.probability += h.probability();
+  }
+  update.match = best_of(
+      update.observed,
+      [&](const Observed& o) { return std::abs(o.step - *middle) <= kMatchSteps; }, ratio);
+  if (!update.match) {
+    update.match = best_of(
+        update.observed, [&](const Observed& o) { return is_near(o.step, *middle, loops); }, ratio);
+  }
+  // A place elsewhere that shows so much by itself that it needs no path shares the view, from
+  // closer.
+  const double from_anywhere = kReturn / (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
+  const auto best = best_of(
+      update.observed, [](const Observed& /*o*/) { return true; },
+      [&](const Observed& o) {
+        return ratio(o) + std::log(std::max(update.prior.at(o.step), from_anywhere));
+      });
+  if (!best || is_near(update.observed[*best].step, *middle, loops)) return;
+  // Where the likeliest step may not be a candidate, no path speaks for the best one.
+  if (!update.match) update.probability = update.belief.at(update.observed[*best].step);
+  update.probability = std::min(update.probability, update.revisit);
+  update.match = best;
+}
+
+}  // namespace
+
+double PlaceFilter::Belief::elsewhere() const {
+  double sum = 0;
+  for (const Hypothesis& h : places) sum += h.probability();
+  return std::max(0.0, 1 - sum);
+}
+
+double PlaceFilter::Belief::at(std::ptrdiff_t step) const {
+  const auto found = std::ranges::lower_bound(places, step, {}, &Hypothesis::step);
+  return found != places.end() && found->step == step ? found->probability() : 0.0;
+}
+
+double PlaceFilter::Observed::log_likelihood_ratio() const {
+  return std::min(kMaxLogRatio, terms.votes + terms.geometry);
+}
+
+PlaceFilter::Belief PlaceFilter::predict(bool is_step) const {
+  if (!is_step) return before_;
+  std::map<std::ptrdiff_t, Hypothesis> next;
+  for (const Hypothesis& h : belief_.places) {
+    const double forward = (1 - kLeave) * ((1 - kTurn) * h.forward + kTurn * h.backward);
+    const double backward = (1 - kLeave) * ((1 - kTurn) * h.backward + kTurn * h.forward);
+    for (std::size_t moved = 0; moved < kMoves.size(); ++moved) {
+      const auto steps = static_cast<std::ptrdiff_t>(moved);
+      next[h.step + steps].forward += kMoves[moved] * forward;
+      next[h.step - steps].backward += kMoves[moved] * backward;
+    }
+  }
+  Belief belief;
+  belief.places.reserve(next.size());
+  for (const auto& [step, h] : next) belief.places.push_back({step, h.forward, h.backward});
+  return belief;
+}
+
+std::vector<std::ptrdiff_t> PlaceFilter::likeliest(const Belief& belief, double min_probability,
+                                                   std::size_t most) {
+  std::vector<Hypothesis> places = belief.places;
+  std::ranges::stable_sort(places, std::greater{}, &Hypothesis::probability);
+  std::vector<std::ptrdiff_t> steps;
+  for (const Hypothesis& h : places) {
+    if (steps.size() == most || h.probability() < min_probability) break;
+    const bool is_apart = std::ranges::all_of(
+        steps, [&](std::ptrdiff_t s) { return std::abs(s - h.step) > kOnePathSteps / 2; });
+    if (is_apart) steps.push_back(h.step);
+  }
+  return steps;
+}
+
+/// Votes in standard deviations from what equally similar places have, less what this place shows
+/// other frames.
+std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>& verified,
+                                            std::size_t num_similar) const {
+  std::vector<double> sigmas(verified.size(), 0.0);
+  if (num_similar < kMinNull) return sigmas;
+  std::vector<double> null;
+  null.reserve(num_similar);
+  for (std::size_t i = 0; i < num_similar; ++i) null.push_back(stabilized(verified[i].votes));
+  const double middle = median(null);
+  for (double& value : null) value = std::abs(value - middle);
+  const double deviation = std::max(kMinDeviation, kDeviationsPerMedian * median(null));
+  for (std::size_t i = 0; i < verified.size(); ++i) {
+    const double z = (stabilized(verified[i].votes) - middle) / deviation;
+    sigmas[i] = std::clamp(z - mean_shown(verified[i].step), kMinSigmas, kMaxSigmas);
+  }
+  return sigmas;
+}
+
+/// Consecutive frames are not independent witnesses: the more alike wrong places look from one step
+/// to the next, the less each counts.
+double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null) const {
+  const double correlation = std::clamp(same_path_products_ / same_path_squares_, 0.0, 0.95);
+  const auto degrees = static_cast<double>(std::min(kMaxDegrees, num_null - 1));
+  const double ratio = shifted_normal(sigmas, kMeanSigmas) / student_t(sigmas, degrees);
+  return (1 - correlation) / (1 + correlation) * std::log(ratio);
+}
+
+/// The tail of wrong places is a Lomax distribution: an exponential one whose mean is only as well
+/// known as the map is large. Geometry chose the candidate among all steps, which is why their
+/// number counts.
+double PlaceFilter::geometry_log_ratio(double evidence, std::ptrdiff_t num_steps) const {
+  const double excess = evidence - CandidateVerifier::kChanceInliers;
+  if (excess <= 0) return 0;
+  const double rate = tail_.seen / (tail_.seen + tail_.unseen);
+  const double density = rate * tail_.count / tail_.excess *
+                         std::pow(1 + excess / tail_.excess, -(tail_.count + 1));
+  const auto steps = static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps));
+  return kGeometryWeight * std::max(0.0, std::log(steps * kGeometryDensity / density));
+}
+
+std::vector<PlaceFilter::Observed> PlaceFilter::observe(
+    const std::vector<VerifiedCandidate>& verified, std::size_t num_similar,
+    std::ptrdiff_t num_steps) const {
+  const std::vector<double> sigmas = deviations(verified, num_similar);
+  std::vector<Observed> observed;
+  observed.reserve(verified.size());
+  for (std::size_t i = 0; i < verified.size(); ++i) {
+    Observed o{.step = verified[i].step, .sigmas = sigmas[i]};
+    if (num_similar >= kMinNull) o.terms.votes = votes_log_ratio(sigmas[i], num_similar);
+    if (verified[i].geometry) {
+      o.evidence = verified[i].geometry->evidence();
+      o.terms.geometry = geometry_log_ratio(o.evidence, num_steps);
+    }
+    observed.push_back(o);
+  }
+  return observed;
+}
+
+PlaceFilter::Update PlaceFilter::update(
+    Belief prior, const std::vector<VerifiedCandidate>& verified, std::size_t num_similar,
+    std::ptrdiff_t num_steps, bool is_step, const KnownLoops& loops,
+    const std::function<bool(std::ptrdiff_t)>& may_be_at) const {
+  Update update;
+  update.observed = observe(verified, num_similar, num_steps);
+  update.has_null = num_similar >= kMinNull;
+  std::erase_if(prior.places, [&](const Hypothesis& h) { return !may_be_at(h.step); });
+  return_to(update.observed, num_steps, prior);
+  share_among_laps(loops, prior.places);
+
+  // Bayes: prior times likelihood ratio, against "somewhere new", whose ratio is 1.
+  const ByStep ratios = log_ratios(update.observed);
+  const ByStep& previous = is_step ? latest_ : previous_;
+  double sum = prior.elsewhere();
+  update.belief = prior;
+  for (Hypothesis& h : update.belief.places) {
+    const auto found = find_step(ratios, h.step);
+    if (found == ratios.end()) {
+      sum += h.probability();
+      continue;
+    }
+    const auto weighed = [&](int direction) {
+      const double again = std::min(std::max(0.0, found->second),
+                                    repeated(previous, h.step, direction));
+      return std::exp(found->second - kRepeated * again);
+    };
+    h.forward *= weighed(1);
+    h.backward *= weighed(-1);
+    sum += h.probability();
+  }
+  for (Hypothesis& h : update.belief.places) {
+    h.forward /= sum;
+    h.backward /= sum;
+  }
+  std::erase_if(update.belief.places,
+                [](const Hypothesis& h) { return h.probability() < kMinProbability; });
+  update.prior = std::move(prior);
+  choose_match(num_steps, loops, update);
+  return update;
+}
+
+PlaceFilter::Next PlaceFilter::prepare(Update update, bool is_step, const KnownLoops& loops) {
+  Next next{.tail = tail_, .is_step = is_step};
+  if (is_step) {
+    learn(update, loops, next);
+    for (const auto& [step, sigmas] : next.sigmas) shown_.try_emplace(step);
+    next.latest = log_ratios(update.observed);
+    next.before = std::move(update.prior);
+  }
+  next.belief = std::move(update.belief);
+  return next;
+}
+
+/// What is not near the likeliest place was wrong, as far as the robot is somewhere new.
+void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& next) const {
+  const auto middle = peak(update.belief);
+  std::vector<Observed> wrong = update.observed;
+  if (middle && update.probability > 0.5) {
+    std::erase_if(wrong, [&](const Observed& o) { return is_near(o.step, *middle, loops); });
+  }
+  double most = 0;
+  for (const Observed& o : wrong) most = std::max(most, o.evidence);
+  const double weight = 1 - update.revisit;
+  const double excess = most - CandidateVerifier::kChanceInliers;
+  if (excess > 0) {
+    next.tail.seen += weight;
+    next.tail.count += weight;
+    next.tail.excess += weight * excess;
+  } else {
+    next.tail.unseen += weight;
+  }
+  next.has_null = update.has_null;
+  if (!update.has_null) return;
+  next.sigmas = largest_of_steps(wrong, [](const Observed& o) { return o.sigmas; });
+  for (const auto& [step, sigmas] : next.sigmas) {
+    next.shown.push_back(std::clamp(sigmas + mean_shown(step), -kMaxLearned, kMaxLearned));
+    const auto before = find_step(latest_sigmas_, step - 1);
+    if (before == latest_sigmas_.end()) continue;
+    next.products += sigmas * before->second;
+    next.squares += (sigmas * sigmas + before->second * before->second) / 2;
+  }
+}
+
+void PlaceFilter::commit(Next next) noexcept {
+  belief_ = std::move(next.belief);
+  if (!next.is_step) return;
+  before_ = std::move(next.before);
+  previous_ = std::exchange(latest_, std::move(next.latest));
+  tail_ = next.tail;
+  if (!next.has_null) return;
+  for (std::size_t i = 0; i < next.sigmas.size(); ++i) {
+    Shown& shown = shown_.find(next.sigmas[i].first)->second;
+    shown.sum += next.shown[i];
+    ++shown.count;
+  }
+  latest_sigmas_ = std::move(next.sigmas);
+  same_path_products_ += next.products;
+  same_path_squares_ += next.squares;
+}
+
+/// Of the frames of other places that were compared with the step, drawn towards 0 while they are
+/// few.
+double PlaceFilter::mean_shown(std::ptrdiff_t step) const {
+  const auto found = shown_.find(step);
+  return found == shown_.end() ? 0.0 : found->second.sum / (found->second.count + kShownPrior);
+}
+
+void PlaceFilter::withdraw(std::ptrdiff_t step, const KnownLoops& loops) {
+  for (Belief* belief : {&before_, &belief_}) {
+    std::erase_if(belief->places,
+                  [&](const Hypothesis& h) { return is_near(h.step, step, loops); });
+  }
+}
+
+}  // namespace loopbit

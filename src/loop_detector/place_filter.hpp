@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "candidate_verifier.hpp"
+#include "known_loops.hpp"
+
+namespace loopbit {
+
+/// The probability that the robot is back at an earlier place, and at which: a discrete Bayes filter
+/// over the steps of the past (changes of view) and "somewhere new". docs/method.md, section 4, has
+/// the model; every constant stands in place_filter.cpp with its reason.
+///
+/// Emission: what a candidate shows, displacement votes and geometry, as a likelihood ratio of "the
+/// same place" against "another place". Both nulls are measured on this map: votes against what
+/// equally similar places show this frame and what this place shows other frames, inliers against
+/// what the best wrong places showed so far. Transition: the robot follows an earlier path forward
+/// or backward at up to two steps per step, leaves it, or returns anywhere.
+///
+/// Only places that were looked at gain probability, so cost and memory of a frame do not grow with
+/// the map.
+class PlaceFilter {
+ public:
+  /// That the robot is at a step of the past, and moves along it forward or backward.
+  struct Hypothesis {
+    std::ptrdiff_t step = 0;
+    double forward = 0;
+    double backward = 0;
+
+    [[nodiscard]] double probability() const { return forward + backward; }
+  };
+
+  /// A probability for each of a few steps, in their order; the rest is somewhere new.
+  struct Belief {
+    std::vector<Hypothesis> places;
+
+    [[nodiscard]] double elsewhere() const;
+    [[nodiscard]] double at(std::ptrdiff_t step) const;
+  };
+
+  /// The terms of the log odds of the match, in nats.
+  struct Terms {
+    double votes = 0;     ///< log likelihood ratio of its displacement votes
+    double geometry = 0;  ///< the same of its inliers
+    double path = 0;      ///< log odds from the frames before
+  };
+
+  /// A candidate of the frame, as the filter sees it.
+  struct Observed {
+    std::ptrdiff_t step = 0;
+    Terms terms = {};
+    double sigmas = 0;    ///< votes in standard deviations of the null; 0 where there is no null
+    double evidence = 0;  ///< CandidateGeometry::evidence, 0 if it was not looked at closer
+
+    [[nodiscard]] double log_likelihood_ratio() const;
+  };
+
+  /// What one frame tells.
+  struct Update {
+    Belief prior;   ///< before the frame was seen
+    Belief belief;  ///< after it
+    std::vector<Observed> observed;
+    /// Index of the candidate that shows the same place best, if any was observed there.
+    std::optional<std::size_t> match;
+    bool has_null = false;   ///< there were places enough to tell what votes mean
+    double probability = 0;  ///< that the match is right
+    double revisit = 0;      ///< that any match is right
+  };
+
+  /// A number for each of some steps, in their order.
+  using ByStep = std::vector<std::pair<std::ptrdiff_t, double>>;
+
+  /// A tail that was measured: how often, and how far beyond its beginning on average.
+  struct Tail {
+    double seen;
+    double unseen;
+    double excess;
+    double count;
+  };
+
+  /// The frame to come, before it is seen. `is_step`: it changes the view; otherwise it stands for
+  /// the last step.
+  [[nodiscard]] Belief predict(bool is_step) const;
+
+  /// The steps with most probability, at least `min_probability`, far enough apart to be different
+  /// paths, and at most `most`.
+  static std::vector<std::ptrdiff_t> likeliest(const Belief& belief, double min_probability,
+                                               std::size_t most);
+
+  /// `verified`: the candidates of the frame; the first `num_similar` look most alike. `num_steps`:
+  /// changes of view that may be candidates. `may_be_at(step)`: false for steps that are excluded.
+  [[nodiscard]] Update update(Belief prior, const std::vector<VerifiedCandidate>& verified,
+                              std::size_t num_similar, std::ptrdiff_t num_steps, bool is_step,
+                              const KnownLoops& loops,
+                              const std::function<bool(std::ptrdiff_t)>& may_be_at) const;
+
+  /// What commit() changes.
+  struct Next {
+    Belief before = {};
+    Belief belief = {};
+    ByStep latest = {};
+    ByStep sigmas = {};
+    std::vector<double> shown = {};  ///< what is added for each of `sigmas`
+    Tail tail = {};
+    double products = 0;
+    double squares = 0;
+    bool is_step = false;
+    bool has_null = false;
+  };
+
+  /// Learns what wrong places show, and takes the memory that commit() needs. Changes no answer.
+  Next prepare(Update update, bool is_step, const KnownLoops& loops);
+
+  /// Makes `next` the present state.
+  void commit(Next next) noexcept;
+
+  /// Forgets that the robot may be near `step`.
+  void withdraw(std::ptrdiff_t step, const KnownLoops& loops);
+
+ private:
+  /// The running sum of what a place shows frames of other places.
+  struct Shown {
+    double sum = 0;
+    int count = 0;
+  };
+
+  [[nodiscard]] std::vector<Observed> observe(const std::vector<VerifiedCandidate>& verified,
+                                              std::size_t num_similar,
+                                              std::ptrdiff_t num_steps) const;
+  [[nodiscard]] std::vector<double> deviations(const std::vector<VerifiedCandidate>& verified,
+                                               std::size_t num_similar) const;
+  [[nodiscard]] double mean_shown(std::ptrdiff_t step) const;
+  [[nodiscard]] double votes_log_ratio(double sigmas, std::size_t num_null) const;
+  [[nodiscard]] double geometry_log_ratio(double evidence, std::ptrdiff_t num_steps) const;
+  void learn(const Update& update, const KnownLoops& loops, Next& next) const;
+
+  Belief before_;    ///< predicted for the last step
+  Belief belief_;    ///< of the last frame
+  ByStep previous_;  ///< log likelihood ratios of the step before the last one
+  ByStep latest_;    ///< of the last step
+  ByStep latest_sigmas_;
+  std::unordered_map<std::ptrdiff_t, Shown> shown_;  ///< by step
+  Tail tail_{1, 10, 10, 10};
+  double same_path_products_ = 100;  ///< of deviations along a path, and their squares
+  double same_path_squares_ = 200;
+};
+
+}  // namespace loopbit
