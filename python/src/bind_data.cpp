@@ -14,6 +14,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/poses.hpp"
+#include "loopbit/recordings.hpp"
 #include "loopbit/truth_file.hpp"
 
 #include "bindings.hpp"
@@ -31,10 +32,11 @@ using Path = std::filesystem::path;
 using Free = py::call_guard<WithoutGil>;
 
 std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit,
-                                          int max_megapixels) {
+                                          int max_megapixels, const std::string& topic) {
   const Sampling sampling{every, limit};
   return std::make_unique<SharedSource>(
-      subsample(open_source(input.string(), max_megapixels), sampling), input.string(), sampling);
+      subsample(open_input(input.string(), topic, max_megapixels), sampling), input.string(),
+      sampling);
 }
 
 Frame next_frame(SharedSource& source) {
@@ -70,6 +72,24 @@ void bind_frame(py::module_& module) {
       });
 }
 
+void bind_topics(py::module_& module) {
+  py::class_<Topic>(module, "Topic", "A topic of a recording.")
+      .def_property_readonly("name", text_of(&Topic::name), "Such as '/camera/image_raw'.")
+      .def_property_readonly("type", text_of(&Topic::type),
+                             "Type of its messages, such as 'sensor_msgs/msg/Image'.")
+      .def_readonly("messages", &Topic::messages, "How many there are.")
+      .def_readonly("has_images", &Topic::has_images, "Whether open_source() reads them.")
+      .def("__repr__", [](const Topic& self) {
+        return Text{
+            fmt::format("Topic('{}', '{}', {} messages)", self.name, self.type, self.messages)};
+      });
+  module.def(
+      "topics",
+      [](const Path& recording) { return read_recording_info(recording.string()).topics; },
+      py::arg("recording"), Free(),
+      "The topics of a ROS bag (.bag, .db3, or the folder of a ROS 2 bag) or MCAP file, by name.");
+}
+
 void bind_source(py::module_& module) {
   py::class_<SharedSource>(module, "ImageSource",
                            "A sequence of images, read in order: an iterator of Frame.")
@@ -94,11 +114,12 @@ void bind_source(py::module_& module) {
       });
   module.def(
       "open_source", &open_shared, py::arg("input"), py::kw_only(), whole("every") = 1,
-      whole("limit") = 0, whole("max_megapixels") = kMaxMegapixels, Free(),
+      whole("limit") = 0, whole("max_megapixels") = kMaxMegapixels, py::arg("topic") = "", Free(),
       "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
-      "folder, a text file that lists images, an image, a video, or 'camera:N'. Reads only "
-      "every N-th frame, and at most limit frames (0 = all). Images above max_megapixels are "
-      "unreadable.");
+      "folder, a text file that lists images, an image, a video, a ROS bag or MCAP file, or "
+      "'camera:N'. Reads only every N-th frame, and at most limit frames (0 = all). Images above "
+      "max_megapixels are unreadable. topic: of a recording; needed if several have images.");
+  bind_topics(module);
 }
 
 std::vector<PlaceRun> to_runs(const ArrayLike& argument, const char* name) {

@@ -13,10 +13,10 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/folder_watch.hpp"
-#include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
 #include "loopbit/printable.hpp"
+#include "loopbit/recordings.hpp"
 
 #include "commands.hpp"
 #include "map_output.hpp"
@@ -33,6 +33,7 @@ constexpr std::chrono::milliseconds kWatchPause{50};
 struct QueryFlags {
   std::string map;
   std::vector<std::string> images;
+  std::string topic;
   std::string watch;
   std::size_t places = 3;
   std::string place_images;
@@ -121,7 +122,7 @@ class Relocalizer {
   /// called in it.
   void ask(const std::string& input, const std::string& name) {
     try {
-      const auto source = open_source(input, flags_.max_megapixels);
+      const auto source = open_input(input, flags_.topic, flags_.max_megapixels);
       const std::string own_name = fs::path(input).filename().string();
       for (Frame frame; source->next(frame);) {
         frame.name = frame.name == own_name ? name : (fs::path(name) / frame.name).string();
@@ -212,6 +213,7 @@ void add_query(CLI::App& app, int& exit_code) {
       ->type_name("DIR");
   add_map_cache_flag(*command, flags->map_cache_mb);
   add_image_flag(*command, flags->max_megapixels);
+  add_topic_flag(*command, flags->topic);
   command->add_flag("--json", flags->json, "Print one JSON object per image, one per line");
   command
       ->add_option("--set", flags->settings,

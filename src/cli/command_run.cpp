@@ -8,6 +8,8 @@
 
 #include <fmt/format.h>
 
+#include "loopbit/recordings.hpp"
+
 #include "commands.hpp"
 #include "session.hpp"
 #include "truth_flags.hpp"
@@ -20,6 +22,7 @@ namespace fs = std::filesystem;
 struct RunFlags {
   SessionFlags session;
   std::string input;
+  std::string topic;
   Sampling sampling;
   int max_megapixels = kMaxMegapixels;
   TruthFlags truth;
@@ -46,8 +49,9 @@ int run_command(RunFlags& flags, const Arguments& arguments) {
   run.arguments = arguments;
   run.scoring = flags.truth.scoring;
   run.poses = flags.truth.poses;
-  return run_session(subsample(open_source(flags.input, flags.max_megapixels), flags.sampling),
-                     flags.input, flags.sampling, flags.session);
+  return run_session(
+      subsample(open_input(flags.input, flags.topic, flags.max_megapixels), flags.sampling),
+      flags.input, flags.sampling, flags.session);
 }
 
 }  // namespace
@@ -56,9 +60,10 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   auto flags = std::make_shared<RunFlags>();
   CLI::App* command = app.add_subcommand("run", "Find the loops in a sequence of images");
   command
-      ->add_option("INPUT", flags->input,
-                   "A folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
-                   "folder, a text file listing images, a video, or camera:N")
+      ->add_option(
+          "INPUT", flags->input,
+          "A folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
+          "folder, a text file listing images, a video, a ROS bag or MCAP file, or camera:N")
       ->required();
   command
       ->add_option(
@@ -74,6 +79,7 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
       ->type_name("N")
       ->check(whole_number(0, 2'000'000'000));
   add_image_flag(*command, flags->max_megapixels);
+  add_topic_flag(*command, flags->topic);
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
   command->footer(list_truth_settings());

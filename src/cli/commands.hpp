@@ -37,6 +37,7 @@ void add_pairs(CLI::App& app);
 void add_eval(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_report(CLI::App& app);
+void add_topics(CLI::App& app);
 void add_options(CLI::App& app);
 
 /// "NAME=VALUE" in two. Throws Error (kind option) without a "=".

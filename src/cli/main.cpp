@@ -111,6 +111,7 @@ int run_command_line(int argc, char** argv) {
   cli::add_eval(app);
   cli::add_compare(app);
   cli::add_report(app);
+  cli::add_topics(app);
   cli::add_options(app);
   check_command(app, "loopbit", 1, argc, argv);
   try {

@@ -104,6 +104,14 @@ void add_image_flag(CLI::App& command, int& max_megapixels) {
       ->check(whole_number(1, 1'000'000));
 }
 
+void add_topic_flag(CLI::App& command, std::string& topic) {
+  command
+      .add_option("--topic", topic,
+                  "The topic of a recording to read; needed if several have images. 'loopbit "
+                  "topics' lists them")
+      ->type_name("NAME");
+}
+
 LoopDetectorOptions SessionFlags::detector_options() const {
   LoopDetectorOptions options = config.empty() ? loopbit::preset(preset) : load_options(config);
   for (const std::string& setting : settings) {

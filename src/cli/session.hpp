@@ -42,6 +42,9 @@ void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb);
 /// Adds the flag for open_source()'s largest images to `command`.
 void add_image_flag(CLI::App& command, int& max_megapixels);
 
+/// Adds the flag for open_input()'s topic to `command`.
+void add_topic_flag(CLI::App& command, std::string& topic);
+
 /// Runs a detector over the frames of `input` that `sampling` leaves, as `flags` ask, with progress
 /// on stderr and a summary or JSON on stdout. Returns the exit code. Interrupts (Ctrl-C) end it in
 /// order. Throws Error.

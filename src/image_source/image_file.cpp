@@ -85,8 +85,11 @@ cv::Mat decode(const std::vector<unsigned char>& bytes, const std::string& thing
 }  // namespace
 
 cv::Mat read_image_file(const fs::path& file, int max_megapixels) {
-  const std::string thing = image_thing(file);
-  const std::vector<unsigned char> bytes = read_bytes(file);
+  return decode_image(read_bytes(file), max_megapixels, image_thing(file));
+}
+
+cv::Mat decode_image(const std::vector<unsigned char>& bytes, int max_megapixels,
+                     const std::string& thing) {
   if (is_cut_off(bytes)) {
     fail(thing, fmt::format("is cut off after {} bytes: copy it again", bytes.size()));
   }
@@ -98,6 +101,12 @@ cv::Mat read_image_file(const fs::path& file, int max_megapixels) {
   }
   check_pixel_format(image, thing);
   return image;
+}
+
+void check_max_megapixels(int max_megapixels) {
+  if (max_megapixels >= 1) return;
+  throw Error(ErrorKind::option,
+              fmt::format("max_megapixels is {}, but must be at least 1.", max_megapixels));
 }
 
 void check_pixel_count(std::int64_t width, std::int64_t height, int max_megapixels,

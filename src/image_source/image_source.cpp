@@ -107,10 +107,7 @@ std::unique_ptr<ImageSource> open_file(const fs::path& file, int max_megapixels)
 }  // namespace
 
 std::unique_ptr<ImageSource> open_source(const std::string& input, int max_megapixels) {
-  if (max_megapixels < 1) {
-    throw Error(ErrorKind::option,
-                fmt::format("max_megapixels is {}, but must be at least 1.", max_megapixels));
-  }
+  images::check_max_megapixels(max_megapixels);
   if (input.starts_with(kCameraPrefix)) {
     return images::open_camera(camera_number(std::string_view(input).substr(kCameraPrefix.size())));
   }

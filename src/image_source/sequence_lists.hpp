@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace loopbit::images {
@@ -28,9 +27,5 @@ ImageList list_folder(const std::filesystem::path& folder);
 
 /// The images that `file`, an image list, names. Throws as list_folder does.
 ImageList list_file(const std::filesystem::path& file);
-
-/// Runs of digits count as numbers: 2.png comes before 10.png. Names that differ in leading zeros
-/// only are ordered byte by byte, so that the order is total.
-bool natural_less(std::string_view a, std::string_view b);
 
 }  // namespace loopbit::images

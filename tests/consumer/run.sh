@@ -41,7 +41,7 @@ components() {
     -DCMAKE_PREFIX_PATH="$prefix" "$@" | tee "$scratch/found"
 }
 components
-for component in loopbit images map data both; do
+for component in loopbit images map recordings data both; do
   grep -qxF -e "-- found $component" "$scratch/found"
 done
 if [[ $is_static ]]; then

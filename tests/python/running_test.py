@@ -198,7 +198,7 @@ def test_frames_that_nobody_knows():
 RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views": "views",
            "truth_variable": "variable", "poses": "positions_m", "no_report": "evidence"}
 OF_OPTIONS = {"preset", "config", "set"}
-OF_SOURCE = {"every", "limit", "max_megapixels"}
+OF_SOURCE = {"every", "limit", "max_megapixels", "topic"}
 OF_THE_COMMAND = {"help", "threads", "pictures_mb", "open", "json", "quiet"}
 
 

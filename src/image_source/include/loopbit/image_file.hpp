@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -14,6 +16,13 @@ namespace loopbit::images {
 /// EXIF orientation. Throws Error (kind input) if it cannot be read whole, is over 512 MiB, or has
 /// more pixels than `max_megapixels` by its header; it is not decoded then.
 cv::Mat read_image_file(const std::filesystem::path& file, int max_megapixels);
+
+/// As read_image_file(), of the bytes of such a file; `thing` begins the sentence of an error.
+cv::Mat decode_image(const std::vector<unsigned char>& bytes, int max_megapixels,
+                     const std::string& thing);
+
+/// Throws Error (kind option) if `max_megapixels` is less than 1.
+void check_max_megapixels(int max_megapixels);
 
 /// Throws Error (kind input) if an image of such a size is too large; `thing` begins the sentence.
 void check_pixel_count(std::int64_t width, std::int64_t height, int max_megapixels,
@@ -30,5 +39,9 @@ std::string image_extensions();
 
 /// In lower case, with its dot.
 std::string lower_extension(const std::filesystem::path& name);
+
+/// Runs of digits count as numbers: 2.png comes before 10.png. Names that differ in leading zeros
+/// only are ordered byte by byte, so that the order is total.
+bool natural_less(std::string_view a, std::string_view b);
 
 }  // namespace loopbit::images
