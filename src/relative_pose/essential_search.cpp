@@ -3,10 +3,7 @@
 #include "essential_search.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdint>
-#include <limits>
 #include <utility>
 
 #include <opencv2/calib3d.hpp>
@@ -16,8 +13,12 @@
 namespace loopbit {
 namespace {
 
-constexpr int kSamples = 12;
-constexpr std::size_t kSampleSize = 5;
+constexpr int kStarts = 16;
+constexpr std::size_t kFewPairs = 60;
+constexpr std::size_t kRefined = 4;
+constexpr std::size_t kMinInliers = 8;
+/// Before the pose is nearly right, pairs far from it count, too.
+constexpr double kWideGate = 1e3;
 /// Of the virtual pinhole images. What is further from the axis than 80 degrees is outside.
 constexpr double kVirtualFocal_px = 500;
 constexpr double kMinForward = 0.17;
@@ -69,46 +70,26 @@ std::vector<RayPair> fundamental_inliers(std::span<const RayPair> pairs, double 
   return inliers;
 }
 
-/// Five different numbers below n, the same for each run.
-class Samples {
- public:
-  explicit Samples(std::size_t n) : n_(n) {}
-
-  std::array<std::size_t, kSampleSize> next() {
-    std::array<std::size_t, kSampleSize> sample{};
-    for (std::size_t i = 0; i < kSampleSize; ++i) {
-      do {
-        sample[i] = draw();
-      } while (std::find(sample.begin(), sample.begin() + i, sample[i]) != sample.begin() + i);
-    }
-    return sample;
+/// Directions all over a half of the sphere: a translation and its opposite have the same essential
+/// matrix. A spiral of equal areas.
+std::vector<cv::Vec3d> half_sphere(int count) {
+  constexpr double kGoldenAngle = 2.399963229728653;
+  std::vector<cv::Vec3d> directions;
+  for (int i = 0; i < count; ++i) {
+    const double z = (i + 0.5) / count;
+    const double radius = std::sqrt(1 - z * z);
+    directions.emplace_back(radius * std::cos(i * kGoldenAngle), radius * std::sin(i * kGoldenAngle),
+                            z);
   }
+  return directions;
+}
 
- private:
-  std::size_t draw() {  // xorshift64* by Vigna
-    state_ ^= state_ >> 12U;
-    state_ ^= state_ << 25U;
-    state_ ^= state_ >> 27U;
-    return static_cast<std::size_t>(((state_ * 0x2545f4914f6cdd1dU) >> 32U) * n_ >> 32U);
-  }
-
-  std::size_t n_;
-  std::uint64_t state_ = 2019;
-};
-
-/// The up to ten essential matrices of five pairs, below each other.
-cv::Mat1d five_point_matrices(const std::vector<RayPair>& pairs, Samples& samples) {
-  std::array<cv::Point2d, kSampleSize> query;
-  std::array<cv::Point2d, kSampleSize> match;
-  std::size_t i = 0;
-  for (const std::size_t index : samples.next()) {
-    query[i] = on_plane(pairs[index].query.direction);
-    match[i] = on_plane(pairs[index].match.direction);
-    ++i;
-  }
-  // With as many points as unknowns this is the solver alone.
-  constexpr double kUnused = 1.0;
-  return cv::findEssentialMat(query, match, cv::Matx33d::eye(), cv::RANSAC, 0.999, kUnused);
+/// At most `count` pairs, evenly.
+std::vector<RayPair> thinned(std::span<const RayPair> pairs, std::size_t count) {
+  if (pairs.size() <= count) return {pairs.begin(), pairs.end()};
+  std::vector<RayPair> result;
+  for (std::size_t i = 0; i < count; ++i) result.push_back(pairs[i * pairs.size() / count]);
+  return result;
 }
 
 double truncated_cost(const cv::Matx33d& essential, std::span<const RayPair> pairs, double gate) {
@@ -133,6 +114,43 @@ int points_before(const RigidPose& pose, const cv::Matx33d& essential,
     count += is_before_query && is_before_match ? 1 : 0;
   }
   return count;
+}
+
+/// The one of the four poses of an essential matrix that puts most of the pairs' points before both
+/// cameras.
+RigidPose pose_before_cameras(const cv::Matx33d& essential, std::span<const RayPair> pairs,
+                              double gate) {
+  cv::Matx33d first;
+  cv::Matx33d second;
+  cv::Vec3d translation;
+  cv::decomposeEssentialMat(essential, first, second, translation);
+  RigidPose best;
+  int most = -1;
+  for (const cv::Matx33d& rotation : {first, second}) {
+    for (const double sign : {1.0, -1.0}) {
+      const RigidPose pose{rotation, translation * sign};
+      const int count = points_before(pose, essential, pairs, gate);
+      if (count <= most) continue;
+      most = count;
+      best = pose;
+    }
+  }
+  return best;
+}
+
+/// The fit, of the pose whose points are before the cameras. The other sign of a translation has
+/// another covariance.
+PoseFit before_cameras(const PoseFit& fit, std::span<const RayPair> pairs, double gate) {
+  const RigidPose pose = pose_before_cameras(essential_matrix(fit.pose), pairs, gate);
+  return fit_pose(pairs, pose, FitKind::direction, gate, 0);
+}
+
+/// Whether two poses lie in one minimum of the cost.
+bool are_alike(const RigidPose& a, const RigidPose& b) {
+  constexpr double kTranslation = 0.1;
+  constexpr double kRotation = 0.03;
+  return cv::norm(a.translation.cross(b.translation)) < kTranslation &&
+         cv::norm(a.rotation - b.rotation) < kRotation;
 }
 
 /// The homography from directions of the query to those of the match, by least squares.
@@ -168,95 +186,66 @@ double homography_error_sq(const RayPair& pair, const cv::Matx33d& homography) {
   return angle_sq / sigma_sq;
 }
 
-/// The homography of the plane on which nearly all pairs lie, of determinant above 0.
-std::optional<cv::Matx33d> homography_of_plane(std::span<const RayPair> pairs, double gate) {
+}  // namespace
+
+cv::Matx33d rotation_between(std::span<const RayPair> pairs) {
+  cv::Matx33d sum = cv::Matx33d::zeros();
+  for (const RayPair& pair : pairs) sum += pair.match.direction * pair.query.direction.t();
+  cv::Matx31d values;
+  cv::Matx33d u;
+  cv::Matx33d v_t;
+  cv::SVD::compute(sum, values, u, v_t);
+  const cv::Matx33d mirror(1, 0, 0, 0, 1, 0, 0, 0, cv::determinant(u * v_t));
+  return u * mirror * v_t;
+}
+
+std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, double gate) {
+  const std::vector<RayPair> inliers = fundamental_inliers(pairs, gate);
+  if (inliers.size() < kMinInliers) return std::nullopt;
+  // Each start, on some of the inliers.
+  const std::vector<RayPair> few = thinned(inliers, kFewPairs);
+  const cv::Matx33d rotation = rotation_between(few);
+  std::vector<std::pair<double, RigidPose>> found;
+  for (const cv::Vec3d& direction : half_sphere(kStarts)) {
+    const RigidPose pose =
+        fit_pose(few, {rotation, direction}, FitKind::direction, kWideGate, 1).pose;
+    found.emplace_back(truncated_cost(essential_matrix(pose), pairs, gate), pose);
+  }
+  std::ranges::sort(found, {}, &std::pair<double, RigidPose>::first);
+  // The best of those that differ, on all pairs.
+  std::vector<RigidPose> refined;
+  std::vector<PoseFit> fits;
+  for (const auto& [cost, start] : found) {
+    if (std::ranges::any_of(refined, [&](const RigidPose& pose) { return are_alike(start, pose); })) {
+      continue;
+    }
+    refined.push_back(start);
+    fits.push_back(fit_pose(pairs, start, FitKind::direction, gate, kFitRounds));
+    if (refined.size() == kRefined) break;
+  }
+  std::ranges::sort(fits, {}, &PoseFit::cost);
+  DirectionSearch result{before_cameras(fits.front(), pairs, gate), {}};
+  for (const PoseFit& fit : fits) {
+    if (result.rival || are_alike(fit.pose, fits.front().pose)) continue;
+    result.rival = before_cameras(fit, pairs, gate);
+  }
+  return result;
+}
+
+bool lie_on_plane(std::span<const RayPair> pairs, double gate) {
   constexpr int kRounds = 3;
   constexpr double kMinShare = 0.85;
   std::vector<char> is_used(pairs.size(), 1);
-  cv::Matx33d homography;
   std::ptrdiff_t used = 0;
   for (int round = 0; round < kRounds; ++round) {
-    homography = fit_homography(pairs, is_used);
+    const cv::Matx33d homography = fit_homography(pairs, is_used);
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       is_used[i] = homography_error_sq(pairs[i], homography) <= gate * gate ? 1 : 0;
     }
     used = std::ranges::count(is_used, 1);
-    if (static_cast<double>(used) < 0.5 * static_cast<double>(pairs.size())) return std::nullopt;
+    if (2 * used < std::ssize(pairs)) return false;
   }
-  if (static_cast<double>(used) < kMinShare * static_cast<double>(pairs.size())) {
-    return std::nullopt;
-  }
-  return cv::determinant(homography) > 0 ? homography : homography * -1.0;
-}
-
-}  // namespace
-
-RigidPose pose_before_cameras(const cv::Matx33d& essential, std::span<const RayPair> pairs,
-                              double gate) {
-  cv::Matx33d first;
-  cv::Matx33d second;
-  cv::Vec3d translation;
-  cv::decomposeEssentialMat(essential, first, second, translation);
-  RigidPose best;
-  int most = -1;
-  for (const cv::Matx33d& rotation : {first, second}) {
-    for (const double sign : {1.0, -1.0}) {
-      const RigidPose pose{rotation, translation * sign};
-      const int count = points_before(pose, essential, pairs, gate);
-      if (count <= most) continue;
-      most = count;
-      best = pose;
-    }
-  }
-  return best;
-}
-
-std::optional<RigidPose> search_essential(std::span<const RayPair> pairs, double gate) {
-  const std::vector<RayPair> inliers = fundamental_inliers(pairs, gate);
-  if (inliers.size() < kSampleSize) return std::nullopt;
-  Samples samples(inliers.size());
-  std::optional<cv::Matx33d> best;
-  double lowest = std::numeric_limits<double>::max();
-  for (int i = 0; i < kSamples; ++i) {
-    const cv::Mat1d matrices = five_point_matrices(inliers, samples);
-    for (int row = 0; row + 3 <= matrices.rows; row += 3) {
-      const cv::Matx33d essential(matrices.ptr<double>(row));
-      const double cost = truncated_cost(essential, pairs, gate);
-      if (!(cost < lowest)) continue;
-      lowest = cost;
-      best = essential;
-    }
-  }
-  if (!best) return std::nullopt;
-  return pose_before_cameras(*best, pairs, gate);
-}
-
-std::optional<RigidPose> other_pose_of_plane(std::span<const RayPair> pairs, const RigidPose& pose,
-                                             double gate) {
-  const auto homography = homography_of_plane(pairs, gate);
-  if (!homography) return std::nullopt;
-  std::vector<cv::Mat> rotations;
-  std::vector<cv::Mat> translations;
-  std::vector<cv::Mat> normals;
-  cv::decomposeHomographyMat(*homography, cv::Matx33d::eye(), rotations, translations, normals);
-  std::optional<RigidPose> other;
-  double farthest = 0;
-  for (std::size_t i = 0; i < rotations.size(); ++i) {
-    const cv::Vec3d translation(translations[i].ptr<double>());
-    const cv::Vec3d normal(normals[i].ptr<double>());
-    const bool is_seen = std::ranges::all_of(
-        pairs, [&](const RayPair& pair) { return normal.dot(pair.query.direction) > 0; });
-    if (!is_seen || cv::norm(translation) == 0) continue;
-    const RigidPose candidate{cv::Matx33d(rotations[i].ptr<double>()), cv::normalize(translation)};
-    const double apart = cv::norm(candidate.translation - pose.translation) +
-                         cv::norm(candidate.rotation - pose.rotation);
-    if (apart > farthest) {
-      farthest = apart;
-      other = candidate;
-    }
-  }
-  constexpr double kMinApart = 0.05;
-  return farthest > kMinApart ? other : std::nullopt;
+  return static_cast<double>(used) >= kMinShare * static_cast<double>(pairs.size());
 }
 
 }  // namespace loopbit

@@ -11,20 +11,22 @@
 
 namespace loopbit {
 
-/// The pose, with a translation of length 1, that explains most of the pairs: a fundamental matrix
-/// of virtual pinhole images separates most outliers (epipolar_inliers(), RANSAC over seven), then
-/// samples of five of its inliers go through OpenCV's five-point solver. `gate`: in standard
-/// deviations. None if no sample gives a pose.
-std::optional<RigidPose> search_essential(std::span<const RayPair> pairs, double gate);
+/// The rotation that best turns the query's rays into those of the match (Kabsch 1976).
+cv::Matx33d rotation_between(std::span<const RayPair> pairs);
 
-/// The poses of an essential matrix that put most of the pairs' points before both cameras; two, if
-/// they do so equally well.
-RigidPose pose_before_cameras(const cv::Matx33d& essential, std::span<const RayPair> pairs,
-                              double gate);
+struct DirectionSearch {
+  PoseFit best;
+  std::optional<PoseFit> rival;  ///< the next best that is no neighbour of it
+};
 
-/// Another pose that explains pairs on a plane as `pose` does, if they lie on one; see Ma, Soatto,
-/// Kosecka, Sastry, "An Invitation to 3-D Vision", section 5.3. None if they do not.
-std::optional<RigidPose> other_pose_of_plane(std::span<const RayPair> pairs, const RigidPose& pose,
-                                             double gate);
+/// The pose, with a translation of length 1, that explains most of the pairs. A fundamental matrix
+/// of virtual pinhole images separates most outliers (epipolar_inliers()). The cost has several
+/// minima, so that translations in all directions are starting points; the best few are refined.
+/// `gate`: in standard deviations. None with fewer than 8 inliers.
+std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, double gate);
+
+/// Whether one homography explains nearly all pairs: their points lie on a plane. Two poses may
+/// then explain them (Ma, Soatto, Kosecka, Sastry, "An Invitation to 3-D Vision", section 5.3).
+bool lie_on_plane(std::span<const RayPair> pairs, double gate);
 
 }  // namespace loopbit

@@ -3,8 +3,10 @@
 #include "pose_fit.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace loopbit {
 namespace {
@@ -160,6 +162,36 @@ cv::Matx66d inverse_within(const cv::Matx66d& squares, const cv::Matx66d& projec
   return projection * inverse * projection;
 }
 
+/// Keypoints of one object err together: its outline turns, its shadow moves. So what counts as
+/// independent is not a pair but a cluster of them, by where the query sees them (Liang and Zeger
+/// 1986: cluster-robust "sandwich" covariance).
+cv::Matx66d covariance_of(std::span<const RayPair> pairs, const std::vector<char>& is_used,
+                          const RigidPose& pose, FitKind kind) {
+  constexpr double kCell = 0.15;  // of a direction
+  std::map<std::array<int, 3>, cv::Vec6d> clusters;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (is_used[i] == 0) continue;
+    const Residual residual = residual_of(pairs[i], pose, kind);
+    const double error = std::sqrt(residual.norm_sq());
+    const double weight = error <= kHuber ? 1.0 : kHuber / error;
+    const cv::Vec3d cell = pairs[i].query.direction / kCell;
+    cv::Vec6d& sum = clusters[{cvFloor(cell[0]), cvFloor(cell[1]), cvFloor(cell[2])}];
+    for (int row = 0; row < residual.size; ++row) {
+      for (int a = 0; a < 6; ++a) {
+        sum[a] += weight * residual.value[row] * residual.jacobian(row, a);
+      }
+    }
+  }
+  cv::Matx66d spread = cv::Matx66d::zeros();
+  for (const auto& [cell, sum] : clusters) spread += sum * sum.t();
+  const Equations at = equations_of(pairs, is_used, pose, kind);
+  const cv::Matx66d inverse = inverse_within(at.squares, fitted_directions(pose, kind));
+  const double unknown = kind == FitKind::rotation ? 3 : kind == FitKind::direction ? 5 : 6;
+  const auto count = static_cast<double>(clusters.size());
+  const double correction = count / std::max(count - unknown, 1.0);
+  return inverse * spread * inverse * correction + inverse;
+}
+
 /// Steps until the cost no longer falls.
 void descend(std::span<const RayPair> pairs, const std::vector<char>& is_used, FitKind kind,
              RigidPose& pose) {
@@ -233,8 +265,7 @@ PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind
     descend(pairs, is_used, kind, fit.pose);
   }
   gate_pairs();
-  const Equations at = equations_of(pairs, is_used, fit.pose, kind);
-  fit.covariance = inverse_within(at.squares, fitted_directions(fit.pose, kind));
+  fit.covariance = covariance_of(pairs, is_used, fit.pose, kind);
   return fit;
 }
 

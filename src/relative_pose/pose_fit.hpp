@@ -51,6 +51,9 @@ double epipolar_error_sq(const RayPair& pair, const cv::Matx33d& essential);
 
 cv::Matx33d essential_matrix(const RigidPose& pose);
 
+/// Enough for the inliers to settle.
+inline constexpr int kFitRounds = 3;
+
 /// Refines `start` by Levenberg and Marquardt's method with Huber's loss. Pairs further than `gate`
 /// standard deviations do not count; which these are is decided anew in each of `rounds`.
 PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind kind, double gate,

@@ -7,9 +7,8 @@
 namespace loopbit {
 
 double keypoint_sigma_px(const Keypoint& keypoint) {
-  constexpr double kPixel_px = 0.35;
-  constexpr double kSharePerScale = 0.12;
-  return std::hypot(kPixel_px, kSharePerScale * static_cast<double>(keypoint.scale));
+  constexpr double kSigmaPerScale = 0.19;
+  return kSigmaPerScale * static_cast<double>(keypoint.scale);
 }
 
 std::optional<Ray> ray_of(const PoseView& view, int keypoint) {

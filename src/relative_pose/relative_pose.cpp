@@ -22,7 +22,6 @@ namespace {
 
 /// Of keypoints; see keypoint_sigma_px().
 constexpr double kUsualSigma_px = 0.5;
-constexpr int kFitRounds = 3;
 constexpr int kMinPoints = 8;
 
 double median(std::vector<double> values) {
@@ -51,18 +50,6 @@ std::vector<RayPair> inliers_of(std::span<const RayPair> pairs, const RigidPose&
     if (residual.size > 0 && residual.norm_sq() <= gate * gate) inliers.push_back(pair);
   }
   return inliers;
-}
-
-/// The rotation that best turns the query's rays into those of the match (Horn 1987, Kabsch 1976).
-cv::Matx33d rotation_between(std::span<const RayPair> pairs) {
-  cv::Matx33d sum = cv::Matx33d::zeros();
-  for (const RayPair& pair : pairs) sum += pair.match.direction * pair.query.direction.t();
-  cv::Matx31d values;
-  cv::Matx33d u;
-  cv::Matx33d v_t;
-  cv::SVD::compute(sum, values, u, v_t);
-  const cv::Matx33d mirror(1, 0, 0, 0, 1, 0, 0, 0, cv::determinant(u * v_t));
-  return u * mirror * v_t;
 }
 
 /// The standard deviation of the residuals, in units of the one that was assumed.
@@ -171,7 +158,7 @@ class RelativePoseEstimator::Impl {
               RelativePose& result) const {
     const double scale = residual_scale(inliers, fit.pose, kind);
     result.T_match_query = matrix_of(fit.pose);
-    result.covariance = fit.covariance * (scale * scale);
+    result.covariance = fit.covariance;
     result.rms_px = scale * kUsualSigma_px;
     result.inliers.clear();
     for (const RayPair& pair : inliers) result.inliers.push_back(pair.features);
@@ -180,34 +167,35 @@ class RelativePoseEstimator::Impl {
   /// Sets rotation and direction, and what is known of them.
   void estimate_direction(RelativePose& result) {
     result.status = PoseStatus::no_geometry;
-    const auto start = search_essential(pairs_, gate());
-    if (!start) return;
-    const PoseFit fit = fit_pose(pairs_, *start, FitKind::direction, gate(), kFitRounds);
+    const auto found = search_direction(pairs_, gate());
+    if (!found) return;
+    const PoseFit& fit = found->best;
     inliers_ = inliers_of(pairs_, fit.pose, FitKind::direction, gate());
     if (static_cast<int>(inliers_.size()) < options_.min_inliers) return;
-    start_ = pose_before_cameras(essential_matrix(fit.pose), inliers_, gate());
-    PoseFit whole = fit;
-    whole.pose = start_;
-    report(whole, FitKind::direction, inliers_, result);
+    starts_ = {fit.pose};
+    if (found->rival) starts_.push_back(found->rival->pose);
+    report(fit, FitKind::direction, inliers_, result);
     result.status = PoseStatus::measured;
     result.known = PoseKnown::direction;
-    name_degenerate_case(whole, result);
+    name_degenerate_case(*found, result);
   }
 
-  void name_degenerate_case(const PoseFit& fit, RelativePose& result) {
+  void name_degenerate_case(const DirectionSearch& found, RelativePose& result) {
     const PoseFit turn = fit_pose(inliers_, {rotation_between(inliers_), {}}, FitKind::rotation,
                                   gate(), kFitRounds);
     const auto turned = inliers_of(inliers_, turn.pose, FitKind::rotation, 3.0);
     constexpr double kMinShare = 0.9;
     if (static_cast<double>(turned.size()) > kMinShare * static_cast<double>(inliers_.size())) {
-      start_ = turn.pose;
+      starts_ = {turn.pose};
       report(turn, FitKind::rotation, turned, result);
       result.status = PoseStatus::pure_rotation;
       result.known = PoseKnown::rotation;
       return;
     }
-    if (has_rival(fit)) {
-      result.status = PoseStatus::plane;
+    constexpr double kMaxWorse = 1.2;
+    if (found.rival && found.rival->cost < kMaxWorse * found.best.cost) {
+      const bool is_plane = lie_on_plane(inliers_, gate());
+      result.status = is_plane ? PoseStatus::plane : PoseStatus::ambiguous;
       result.known = PoseKnown::nothing;
       return;
     }
@@ -217,19 +205,6 @@ class RelativePoseEstimator::Impl {
       result.known = PoseKnown::rotation;
       forget_translation(result);
     }
-  }
-
-  /// Whether a second pose explains a plane about as well.
-  bool has_rival(const PoseFit& fit) const {
-    const auto other = other_pose_of_plane(inliers_, fit.pose, gate());
-    if (!other) return false;
-    const PoseFit rival = fit_pose(inliers_, *other, FitKind::direction, gate(), kFitRounds);
-    constexpr double kMinApart = 0.05;
-    const bool is_same = cv::norm(rival.pose.translation - fit.pose.translation) < kMinApart &&
-                         cv::norm(rival.pose.rotation - fit.pose.rotation) < kMinApart;
-    if (is_same) return false;
-    constexpr double kMaxWorse = 1.5;
-    return rival.cost < kMaxWorse * fit.cost;
   }
 
   static void forget_translation(RelativePose& result) {
@@ -286,9 +261,11 @@ class RelativePoseEstimator::Impl {
     std::vector<RayPair> with_depth;
     std::ranges::copy_if(pairs_, std::back_inserter(with_depth), &RayPair::has_depth);
     if (static_cast<int>(with_depth.size()) < kMinPoints) return std::nullopt;
-    std::vector<RigidPose> starts{{start_.rotation, {}}};
-    if (const auto length = length_m(inliers_with_depth(), start_)) {
-      starts.push_back({start_.rotation, start_.translation * *length});
+    std::vector<RigidPose> starts;
+    for (const RigidPose& start : starts_) {
+      starts.push_back({start.rotation, {}});
+      const auto length = length_m(inliers_with_depth(), start);
+      if (length) starts.push_back({start.rotation, start.translation * *length});
     }
     if (const auto pose = pose_of_points(inliers_with_depth())) starts.push_back(*pose);
     std::optional<PoseFit> best;
@@ -318,7 +295,7 @@ class RelativePoseEstimator::Impl {
   Verification found_;
   std::vector<RayPair> pairs_;
   std::vector<RayPair> inliers_;  ///< of the direction
-  RigidPose start_;               ///< what the directions say
+  std::vector<RigidPose> starts_;  ///< what the directions say, best first
 };
 
 RelativePoseEstimator::RelativePoseEstimator(const RelativePoseOptions& options)
@@ -345,6 +322,8 @@ std::string_view to_string(PoseStatus status) {
       return "little_parallax";
     case PoseStatus::plane:
       return "plane";
+    case PoseStatus::ambiguous:
+      return "ambiguous";
   }
   return "";
 }

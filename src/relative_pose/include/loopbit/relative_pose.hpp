@@ -27,11 +27,13 @@ enum class PoseStatus {
   pure_rotation,    ///< the camera only turned, as far as the images show: rotation alone is known
   little_parallax,  ///< too little parallax for a direction: rotation alone is known
   plane,            ///< the points lie on a plane, and two poses explain them: nothing is known
+  ambiguous,        ///< two poses explain points in space about equally well: nothing is known
 };
 
 inline constexpr std::array kAllPoseStatuses{PoseStatus::measured,      PoseStatus::few_matches,
                                              PoseStatus::no_geometry,   PoseStatus::pure_rotation,
-                                             PoseStatus::little_parallax, PoseStatus::plane};
+                                             PoseStatus::little_parallax, PoseStatus::plane,
+                                             PoseStatus::ambiguous};
 
 /// How much of a relative pose is known.
 enum class PoseKnown {
@@ -130,8 +132,8 @@ struct RelativePose {
 /// Estimates relative poses. It keeps its working memory. Not thread-safe; use one per thread.
 ///
 /// Rays take the place of pixels, so that every lens works. RANSAC on all matches (see
-/// epipolar_inliers()) is followed by OpenCV's five-point solver on the inliers, and a nonlinear
-/// least-squares fit with a robust loss, each residual weighted by the noise of its two keypoints.
+/// epipolar_inliers()) is followed by nonlinear least squares with a robust loss, from many starting
+/// points, each residual weighted by the noise of its two keypoints.
 /// With depths, each inlier with a depth adds a second equation, and the translation gets a length;
 /// SQPnP is a second starting point. The same input gives the same pose. Cost: 1 ms after the
 /// matches, see scripts/bench_poses.
