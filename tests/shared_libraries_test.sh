@@ -31,6 +31,7 @@ link() {
 link loopbit
 link loopbit_map -lloopbit
 link loopbit_images -lloopbit
+link loopbit_poses -lloopbit -lopencv_calib3d -lyaml-cpp
 link loopbit_data -lloopbit_images -lloopbit_map -lloopbit
 link loopbit_report -lloopbit_data -lloopbit_images -lloopbit_map -lloopbit
 

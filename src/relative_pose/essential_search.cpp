@@ -15,7 +15,7 @@ namespace {
 
 constexpr int kStarts = 16;
 constexpr std::size_t kFewPairs = 60;
-constexpr std::size_t kRefined = 4;
+constexpr std::size_t kRefined = 6;
 constexpr std::size_t kMinInliers = 8;
 /// Before the pose is nearly right, pairs far from it count, too.
 constexpr double kWideGate = 1e3;
@@ -186,6 +186,26 @@ double homography_error_sq(const RayPair& pair, const cv::Matx33d& homography) {
   return angle_sq / sigma_sq;
 }
 
+/// The homography of the plane on which nearly all pairs lie, of determinant above 0.
+std::optional<cv::Matx33d> homography_of_plane(std::span<const RayPair> pairs, double gate) {
+  constexpr int kRounds = 3;
+  constexpr double kMinShare = 0.85;
+  std::vector<char> is_used(pairs.size(), 1);
+  cv::Matx33d homography;
+  std::ptrdiff_t used = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    homography = fit_homography(pairs, is_used);
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      is_used[i] = homography_error_sq(pairs[i], homography) <= gate * gate ? 1 : 0;
+    }
+    used = std::ranges::count(is_used, 1);
+    if (2 * used < std::ssize(pairs)) return std::nullopt;
+  }
+  const auto needed = kMinShare * static_cast<double>(pairs.size());
+  if (static_cast<double>(used) < needed) return std::nullopt;
+  return cv::determinant(homography) > 0 ? homography : homography * -1.0;
+}
+
 }  // namespace
 
 cv::Matx33d rotation_between(std::span<const RayPair> pairs) {
@@ -232,20 +252,27 @@ std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, 
   return result;
 }
 
-bool lie_on_plane(std::span<const RayPair> pairs, double gate) {
-  constexpr int kRounds = 3;
-  constexpr double kMinShare = 0.85;
-  std::vector<char> is_used(pairs.size(), 1);
-  std::ptrdiff_t used = 0;
-  for (int round = 0; round < kRounds; ++round) {
-    const cv::Matx33d homography = fit_homography(pairs, is_used);
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      is_used[i] = homography_error_sq(pairs[i], homography) <= gate * gate ? 1 : 0;
-    }
-    used = std::ranges::count(is_used, 1);
-    if (2 * used < std::ssize(pairs)) return false;
+std::optional<PoseFit> rival_of_plane(std::span<const RayPair> pairs, const PoseFit& fit,
+                                      double gate) {
+  const auto homography = homography_of_plane(pairs, gate);
+  if (!homography) return std::nullopt;
+  std::vector<cv::Mat> rotations;
+  std::vector<cv::Mat> translations;
+  std::vector<cv::Mat> normals;
+  cv::decomposeHomographyMat(*homography, cv::Matx33d::eye(), rotations, translations, normals);
+  std::optional<PoseFit> rival;
+  for (std::size_t i = 0; i < rotations.size(); ++i) {
+    const cv::Vec3d normal(normals[i].ptr<double>());
+    const bool is_seen = std::ranges::all_of(
+        pairs, [&](const RayPair& pair) { return normal.dot(pair.query.direction) > 0; });
+    const cv::Vec3d translation(translations[i].ptr<double>());
+    if (!is_seen || !(cv::norm(translation) > 0)) continue;
+    const RigidPose start{cv::Matx33d(rotations[i].ptr<double>()), cv::normalize(translation)};
+    const PoseFit other = fit_pose(pairs, start, FitKind::direction, gate, kFitRounds);
+    if (are_alike(other.pose, fit.pose)) continue;
+    if (!rival || other.cost < rival->cost) rival = other;
   }
-  return static_cast<double>(used) >= kMinShare * static_cast<double>(pairs.size());
+  return rival;
 }
 
 }  // namespace loopbit

@@ -25,8 +25,10 @@ struct DirectionSearch {
 /// `gate`: in standard deviations. None with fewer than 8 inliers.
 std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, double gate);
 
-/// Whether one homography explains nearly all pairs: their points lie on a plane. Two poses may
-/// then explain them (Ma, Soatto, Kosecka, Sastry, "An Invitation to 3-D Vision", section 5.3).
-bool lie_on_plane(std::span<const RayPair> pairs, double gate);
+/// If the pairs' points lie on a plane: the other pose that explains them, as the decomposition of
+/// their homography gives it (Ma, Soatto, Kosecka, Sastry, "An Invitation to 3-D Vision", section
+/// 5.3). None if they do not, or if it would put points behind the camera.
+std::optional<PoseFit> rival_of_plane(std::span<const RayPair> pairs, const PoseFit& fit,
+                                      double gate);
 
 }  // namespace loopbit

@@ -193,9 +193,16 @@ class RelativePoseEstimator::Impl {
       return;
     }
     constexpr double kMaxWorse = 1.2;
+    const auto other = rival_of_plane(inliers_, found.best, gate());
+    const PoseFit best = fit_pose(inliers_, found.best.pose, FitKind::direction, gate(), 0);
+    if (other && other->cost < kMaxWorse * best.cost) {
+      starts_.push_back(other->pose);
+      result.status = PoseStatus::plane;
+      result.known = PoseKnown::nothing;
+      return;
+    }
     if (found.rival && found.rival->cost < kMaxWorse * found.best.cost) {
-      const bool is_plane = lie_on_plane(inliers_, gate());
-      result.status = is_plane ? PoseStatus::plane : PoseStatus::ambiguous;
+      result.status = PoseStatus::ambiguous;
       result.known = PoseKnown::nothing;
       return;
     }
