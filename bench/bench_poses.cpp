@@ -7,13 +7,10 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <map>
 #include <numbers>
-#include <optional>
 #include <sstream>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include <fmt/core.h>
@@ -24,8 +21,6 @@
 #include "loopbit/error.hpp"
 #include "loopbit/gray_image.hpp"
 #include "loopbit/ground_truth.hpp"
-#include "loopbit/image_source.hpp"
-#include "loopbit/loop_detector.hpp"
 #include "loopbit/relative_pose.hpp"
 #include "loopbit/world.hpp"
 
@@ -49,6 +44,13 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kStereo_m = 0.3;
+/// Pairs with fewer are no loops.
+constexpr std::size_t kLoopInliers = 25;
+
+CameraModel resolution(CameraModel camera, cv::Size size_px) {
+  camera.size_px = size_px;
+  return camera;
+}
 
 cv::Matx33d rotation_of(const cv::Matx44d& pose) { return pose.get_minor<3, 3>(0, 0); }
 cv::Vec3d translation_of(const cv::Matx44d& pose) { return {pose(0, 3), pose(1, 3), pose(2, 3)}; }
@@ -100,7 +102,6 @@ double nees_ratio(const RelativePose& pose, const cv::Matx44d& truth) {
   const cv::Vec3d p = translation_of(error);
   const cv::Vec3d r = rotation_vector(rotation_of(error));
   const cv::Vec6d all(p[0], p[1], p[2], r[0], r[1], r[2]);
-  cv::Mat inverse;
   // Rank 5 or 3 where the rest is not known.
   cv::Vec6d values;
   cv::Matx66d vectors;
@@ -185,8 +186,8 @@ RelativePose baseline_pose(const loopbit::bench::OrbFeatures& query,
   if (a.size() < 8) return pose;
   cv::Mat mask;
   const double focal_px = camera.fx;
-  const cv::Mat essential = cv::findEssentialMat(a, b, cv::Matx33d::eye(), cv::RANSAC, 0.999,
-                                                 1.0 / focal_px, mask);
+  const cv::Mat essential =
+      cv::findEssentialMat(a, b, cv::Matx33d::eye(), cv::RANSAC, 0.999, 1.0 / focal_px, mask);
   if (essential.rows != 3) return pose;
   cv::Mat rotation;
   cv::Mat translation;
@@ -243,7 +244,7 @@ void bench_drive(const WorldOptions& options, int every, bool is_plain, WorldErr
     const auto matches =
         loopbit::match_features(*request.query.features, *request.match.features, 0.85);
     if (loopbit::epipolar_inliers(*request.query.features, *request.match.features, matches, 2.0)
-            .size() < 25) {
+            .size() < kLoopInliers) {
       continue;  // no loop
     }
     request.matches = matches;
@@ -285,22 +286,155 @@ void bench_drive(const WorldOptions& options, int every, bool is_plain, WorldErr
   }
 }
 
+/// A recorded sequence with the pose of each image.
+struct Sequence {
+  fs::path folder;
+  std::string order;  ///< a list of the images; empty = all in the folder
+  std::string truth;
+  CameraModel camera;
+};
+
+struct SequenceErrors {
+  Errors monocular;
+  Errors odometry;
+};
+
+std::vector<cv::Matx44d> read_matrices(const fs::path& file) {
+  std::ifstream stream(file);
+  std::vector<cv::Matx44d> poses;
+  for (std::string line; std::getline(stream, line);) {
+    std::istringstream row(line);
+    cv::Matx44d pose = cv::Matx44d::eye();
+    for (int i = 0; i < 12; ++i) row >> pose.val[i];
+    if (row) poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::vector<std::string> image_names(const Sequence& sequence) {
+  std::vector<std::string> names;
+  if (sequence.order.empty()) {
+    for (const auto& entry : fs::directory_iterator(sequence.folder / "images")) {
+      names.push_back("images/" + entry.path().filename().string());
+    }
+    std::sort(names.begin(), names.end());
+    return names;
+  }
+  std::ifstream stream(sequence.folder / sequence.order);
+  for (std::string line; std::getline(stream, line);) {
+    if (!line.empty() && line[0] != '#') {
+      names.push_back("images/" + fs::path(line).filename().string());
+    }
+  }
+  return names;
+}
+
+/// The pose of each image: rows of poses.txt belong to the images in the order of their names.
+std::vector<cv::Matx44d> poses_of(const Sequence& sequence, const std::vector<std::string>& names) {
+  const auto rows = read_matrices(sequence.folder / "poses.txt");
+  std::vector<std::string> sorted = names;
+  std::sort(sorted.begin(), sorted.end());
+  std::vector<cv::Matx44d> poses;
+  for (const std::string& name : names) {
+    const auto at = std::lower_bound(sorted.begin(), sorted.end(), name) - sorted.begin();
+    poses.push_back(rows.at(static_cast<std::size_t>(at)));
+  }
+  return poses;
+}
+
+/// True revisits of a recorded sequence: of each run of places its middle.
+SequenceErrors bench_sequence(const Sequence& sequence) {
+  const auto names = image_names(sequence);
+  const auto poses = poses_of(sequence, names);
+  std::vector<Features> features;
+  for (const std::string& name : names) {
+    features.push_back(loopbit::extract_surf(
+        loopbit::gray_image(cv::imread((sequence.folder / name).string(), cv::IMREAD_UNCHANGED))));
+  }
+  const auto at = [](int frame) { return static_cast<std::size_t>(frame); };
+  SequenceErrors errors;
+  RelativePoseEstimator estimator;
+  for (const loopbit::PlaceRun& run :
+       loopbit::read_place_runs((sequence.folder / sequence.truth).string())) {
+    const int match = (run.first + run.last) / 2;
+    PoseRequest request{.query = {&features[at(run.query)], &sequence.camera},
+                        .match = {&features[at(match)], &sequence.camera},
+                        .matches = {}};
+    const auto matches =
+        loopbit::match_features(*request.query.features, *request.match.features, 0.85);
+    if (loopbit::epipolar_inliers(*request.query.features, *request.match.features, matches, 2.0)
+            .size() < kLoopInliers) {
+      continue;  // no loop
+    }
+    request.matches = matches;
+    const cv::Matx44d truth = poses[at(match)].inv() * poses[at(run.query)];
+    errors.monocular.add(timed(estimator, request, errors.monocular), truth);
+    std::vector<NearbyView> beside;
+    for (const int frame : {match - 1, match + 1}) {
+      if (frame < 0 || at(frame) >= names.size()) continue;
+      beside.push_back(
+          {{&features[at(frame)], &sequence.camera}, poses[at(match)].inv() * poses[at(frame)]});
+    }
+    request.beside = beside;
+    errors.odometry.add(timed(estimator, request, errors.odometry), truth);
+  }
+  return errors;
+}
+
+SequenceErrors bench_recorded(const char* name, const Sequence& sequence) {
+  SequenceErrors errors = bench_sequence(sequence);
+  errors.monocular.print(fmt::format("{} monocular", name));
+  errors.odometry.print(fmt::format("{} odometry", name));
+  return errors;
+}
+
+void bench(int drives, const fs::path& data) {
+  WorldErrors errors;
+  for (int drive = 0; drive < drives; ++drive) {
+    WorldOptions options;
+    options.seed = 1 + drive;
+    bench_drive(options, 3, drive == 0, errors);
+  }
+  errors.monocular.print("world monocular");
+  errors.odometry.print("world odometry");
+  errors.stereo.print("world stereo");
+  errors.depth.print("world depth");
+  errors.baseline.print("world ORB + OpenCV");
+  SequenceErrors two_pass;
+  SequenceErrors euroc;
+  if (fs::is_directory(data / "kitti03")) {
+    const CameraModel kitti{.fx = 721.5377, .fy = 721.5377, .cx = 609.5593, .cy = 172.854};
+    two_pass =
+        bench_recorded("kitti03 two pass", {data / "kitti03", "two_pass_order.txt",
+                                            "two_pass_truth.csv", resolution(kitti, {1242, 375})});
+    const CameraModel v1{.lens = loopbit::Lens::radial_tangential,
+                         .size_px = {752, 480},
+                         .fx = 458.654,
+                         .fy = 457.296,
+                         .cx = 367.215,
+                         .cy = 248.375,
+                         .distortion = {-0.28340811, 0.07395907, 0.00019359, 0.0000176187}};
+    euroc = bench_recorded("euroc_room", {data / "euroc_room", "", "truth.csv", v1});
+    const CameraModel head =
+        loopbit::read_camera((data / "office_tour" / "camera-intrinsics.txt").string());
+    bench_recorded("office_tour",
+                   {data / "office_tour", "", "truth.csv", resolution(head, {540, 360})});
+  }
+  fmt::print(
+      "poses world_rotation_deg={:.3f} world_direction_deg={:.2f} metric_percent={:.2f} "
+      "nees_ratio={:.2f} nees_median_ratio={:.2f} two_pass_rotation_deg={:.3f} "
+      "euroc_rotation_deg={:.3f} pose_ms={:.2f}\n",
+      quantile(errors.monocular.rotation_deg, 0.5), quantile(errors.monocular.direction_deg, 0.5),
+      quantile(errors.odometry.metric_percent, 0.5), mean(errors.odometry.nees_ratio),
+      quantile(errors.odometry.nees_ratio, 0.5), quantile(two_pass.monocular.rotation_deg, 0.5),
+      quantile(euroc.monocular.rotation_deg, 0.5), quantile(errors.monocular.time_ms, 0.5));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   try {
-    const int drives = argc > 1 ? std::stoi(argv[1]) : 1;
-    WorldErrors errors;
-    for (int drive = 0; drive < drives; ++drive) {
-      WorldOptions options;
-      options.seed = 1 + drive;
-      bench_drive(options, 3, drive == 0, errors);
-    }
-    errors.monocular.print("world monocular");
-    errors.odometry.print("world odometry");
-    errors.stereo.print("world stereo");
-    errors.depth.print("world depth");
-    errors.baseline.print("world ORB + findEssentialMat");
+    bench(argc > 1 ? std::stoi(argv[1]) : 1, argc > 2 ? argv[2] : "");
   } catch (const loopbit::Error& error) {
     fmt::print(stderr, "bench_poses: {}\n", error.what());
     return 1;

@@ -95,9 +95,10 @@ TEST(Camera, JacobiansAreTheNumericDifferences) {
       for (int i = 0; i < 2; ++i) {
         cv::Vec2d step;
         step[i] = kStep * camera.fx;
-        const cv::Vec3d slope = (*unproject(camera, pixel + step) - *unproject(camera, pixel - step)) *
-                                (0.5 / step[i]);
-        for (int row = 0; row < 3; ++row) EXPECT_NEAR(by_pixel(row, i) * camera.fx, slope[row] * camera.fx, 1e-5);
+        const cv::Vec3d slope =
+            (*unproject(camera, pixel + step) - *unproject(camera, pixel - step)) * (0.5 / step[i]);
+        for (int row = 0; row < 3; ++row)
+          EXPECT_NEAR(by_pixel(row, i) * camera.fx, slope[row] * camera.fx, 1e-5);
       }
       const cv::Vec3d point = *direction * 3.0;
       cv::Matx23d by_point;
@@ -120,7 +121,8 @@ cv::Matx33d matrix_of(const CameraModel& camera) {
 }
 
 TEST(Camera, ProjectsAsOpenCvDoes) {
-  const std::vector<cv::Point3d> points{{0.1, -0.2, 1}, {-0.7, 0.3, 1.5}, {0, 0, 2}, {0.4, 0.5, 1.1}};
+  const std::vector<cv::Point3d> points{
+      {0.1, -0.2, 1}, {-0.7, 0.3, 1.5}, {0, 0, 2}, {0.4, 0.5, 1.1}};
   for (const CameraModel& camera : cameras()) {
     std::vector<cv::Point2d> expected;
     if (camera.lens == Lens::equidistant) {
@@ -182,13 +184,15 @@ TEST(Camera, BadNumbersAreErrors) {
 
 TEST(Camera, AnotherImageSizeIsAnError) {
   check_size(pinhole(), "left", {640, 480});
-  expect_error(ErrorKind::input, {"left", "640 x 480", "320 x 240"},
-               [] { check_size(pinhole(), "left", {320, 240}); });
+  expect_error(ErrorKind::input, {"left", "640 x 480", "320 x 240"}, [] {
+    check_size(pinhole(), "left", {320, 240});
+  });
   CameraModel camera = pinhole();
   camera.size_px = {};
   check_size(camera, "left", {700, 500});
-  expect_error(ErrorKind::input, {"(315, 242)", "200 x 100"},
-               [&] { check_size(camera, "left", {200, 100}); });
+  expect_error(ErrorKind::input, {"(315, 242)", "200 x 100"}, [&] {
+    check_size(camera, "left", {200, 100});
+  });
 }
 
 /// A folder of its own for each test, removed at its end.
@@ -204,9 +208,8 @@ class CameraFile : public testing::Test {
     return path.string();
   }
 
-  std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) /
-      testing::UnitTest::GetInstance()->current_test_info()->name();
+  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) /
+                                  testing::UnitTest::GetInstance()->current_test_info()->name();
 };
 
 TEST_F(CameraFile, ReadsWhatItWrites) {
@@ -233,8 +236,7 @@ distortion_model: radial-tangential
 distortion_coefficients: [-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05]
 )");
   CameraModel expected = euroc();
-  expected.T_body_camera =
-      cv::Matx44d(0, -1, 0, -0.02, 1, 0, 0, -0.06, 0, 0, 1, 0.01, 0, 0, 0, 1);
+  expected.T_body_camera = cv::Matx44d(0, -1, 0, -0.02, 1, 0, 0, -0.06, 0, 0, 1, 0.01, 0, 0, 0, 1);
   EXPECT_EQ(read_camera(path), expected);
 }
 

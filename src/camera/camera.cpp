@@ -101,10 +101,9 @@ std::optional<cv::Vec2d> project_equidistant(const CameraModel& camera, const cv
     const double uy = is_on_axis ? 0 : point[1] / side;
     const double outward = bent.slope * point[2] / length_sq;  // d bent / d side
     const double forward = -bent.slope * side / length_sq;     // d bent / d z
-    const cv::Matx23d bent_by_point(ux * ux * outward + uy * uy * stretch,
-                                    ux * uy * (outward - stretch), ux * forward,
-                                    ux * uy * (outward - stretch),
-                                    uy * uy * outward + ux * ux * stretch, uy * forward);
+    const cv::Matx23d bent_by_point(
+        ux * ux * outward + uy * uy * stretch, ux * uy * (outward - stretch), ux * forward,
+        ux * uy * (outward - stretch), uy * uy * outward + ux * ux * stretch, uy * forward);
     *jacobian = focal_matrix(camera) * bent_by_point;
   }
   return pixel_at(camera, {point[0] * stretch, point[1] * stretch});

@@ -55,7 +55,8 @@ class CameraFile {
   [[nodiscard]] double number(const YAML::Node& node, const char* name) const {
     const std::string text = node && node.IsScalar() ? node.Scalar() : "";
     const auto number = parse_number<double>(std::string_view(text).substr(text.starts_with('+')));
-    if (!number) fail(fmt::format("has '{}' for '{}', where a finite number is needed", text, name));
+    if (!number)
+      fail(fmt::format("has '{}' for '{}', where a finite number is needed", text, name));
     return *number;
   }
 
@@ -72,15 +73,15 @@ class CameraFile {
 
   /// Sets the distortion; what is beyond kMaxDistortion (thin prisms, tilted sensors) must be 0.
   void set_distortion(const std::vector<double>& numbers, CameraModel& camera) const {
-    const std::size_t usable =
-        camera.lens == Lens::equidistant ? 4U : CameraModel::kMaxDistortion;
+    const std::size_t usable = camera.lens == Lens::equidistant ? 4U : CameraModel::kMaxDistortion;
     for (std::size_t i = 0; i < numbers.size(); ++i) {
       if (i < usable) {
         camera.distortion[i] = numbers[i];
       } else if (numbers[i] != 0) {
-        fail(fmt::format("has {} distortion coefficients, of which only the first {} may differ "
-                         "from 0",
-                         numbers.size(), usable));
+        fail(
+            fmt::format("has {} distortion coefficients, of which only the first {} may differ "
+                        "from 0",
+                        numbers.size(), usable));
       }
     }
     const bool has_all =
@@ -100,9 +101,10 @@ class CameraFile {
     for (const std::string_view name : {"equidistant", "equi", "fisheye", "kannala_brandt"}) {
       if (distortion_model == name) return Lens::equidistant;
     }
-    fail(fmt::format("has the distortion model '{}', but loopbit knows radial-tangential, "
-                     "plumb_bob, rational_polynomial, equidistant and none",
-                     distortion_model));
+    fail(
+        fmt::format("has the distortion model '{}', but loopbit knows radial-tangential, "
+                    "plumb_bob, rational_polynomial, equidistant and none",
+                    distortion_model));
   }
 
   [[nodiscard]] cv::Matx44d transform(const YAML::Node& node, const char* name) const {
@@ -125,9 +127,10 @@ std::string text_of(const YAML::Node& node) {
 CameraModel kalibr_camera(const CameraFile& file, const YAML::Node& node) {
   const std::string model = text_of(node["camera_model"]);
   if (model != "pinhole") {
-    file.fail(fmt::format("has the camera model '{}', but loopbit knows pinhole alone, with a "
-                          "distortion model",
-                          model));
+    file.fail(
+        fmt::format("has the camera model '{}', but loopbit knows pinhole alone, with a "
+                    "distortion model",
+                    model));
   }
   CameraModel camera;
   const auto intrinsics = file.numbers(node["intrinsics"], "intrinsics");
@@ -319,8 +322,8 @@ std::optional<FoundCamera> find_camera(const std::string& input) {
     const bool is_gray = fs::is_directory(folder / "image_0", error);
     return FoundCamera{(folder / "calib.txt").string(), is_gray ? 0 : 2};
   }
-  for (const char* name : {"mav0/cam0/sensor.yaml", "cam0/sensor.yaml", "sensor.yaml",
-                           "camera.yaml"}) {
+  for (const char* name :
+       {"mav0/cam0/sensor.yaml", "cam0/sensor.yaml", "sensor.yaml", "camera.yaml"}) {
     if (is_file(folder / name)) return FoundCamera{(folder / name).string(), 0};
   }
   return std::nullopt;
@@ -331,14 +334,16 @@ std::string to_camera_info(const CameraModel& camera) {
   const auto& d = camera.distortion;
   const bool is_rational = d[5] != 0 || d[6] != 0 || d[7] != 0;
   const std::size_t used = is_fisheye ? 4 : is_rational ? 8 : 5;
-  const char* model = is_fisheye ? "equidistant" : is_rational ? "rational_polynomial" : "plumb_bob";
+  const char* model = is_fisheye    ? "equidistant"
+                      : is_rational ? "rational_polynomial"
+                                    : "plumb_bob";
   return fmt::format(
       "image_width: {}\nimage_height: {}\ncamera_name: camera\n"
       "camera_matrix:\n  rows: 3\n  cols: 3\n  data: [{}, 0, {}, 0, {}, {}, 0, 0, 1]\n"
       "distortion_model: {}\n"
       "distortion_coefficients:\n  rows: 1\n  cols: {}\n  data: [{}]\n",
-      camera.size_px.width, camera.size_px.height, camera.fx, camera.cx, camera.fy, camera.cy, model,
-      used, fmt::join(d.begin(), d.begin() + used, ", "));
+      camera.size_px.width, camera.size_px.height, camera.fx, camera.cx, camera.fy, camera.cy,
+      model, used, fmt::join(d.begin(), d.begin() + used, ", "));
 }
 
 }  // namespace loopbit

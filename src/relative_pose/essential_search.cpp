@@ -78,8 +78,8 @@ std::vector<cv::Vec3d> half_sphere(int count) {
   for (int i = 0; i < count; ++i) {
     const double z = (i + 0.5) / count;
     const double radius = std::sqrt(1 - z * z);
-    directions.emplace_back(radius * std::cos(i * kGoldenAngle), radius * std::sin(i * kGoldenAngle),
-                            z);
+    directions.emplace_back(radius * std::cos(i * kGoldenAngle),
+                            radius * std::sin(i * kGoldenAngle), z);
   }
   return directions;
 }
@@ -180,9 +180,9 @@ cv::Matx33d fit_homography(std::span<const RayPair> pairs, const std::vector<cha
 double homography_error_sq(const RayPair& pair, const cv::Matx33d& homography) {
   const cv::Vec3d seen = cv::normalize(homography * pair.query.direction);
   const double angle_sq = cv::norm(seen.cross(pair.match.direction), cv::NORM_L2SQR);
-  const double sigma_sq = (cv::norm(pair.query.spread, cv::NORM_L2SQR) +
-                           cv::norm(pair.match.spread, cv::NORM_L2SQR)) /
-                          2;
+  const double sigma_sq =
+      (cv::norm(pair.query.spread, cv::NORM_L2SQR) + cv::norm(pair.match.spread, cv::NORM_L2SQR)) /
+      2;
   return angle_sq / sigma_sq;
 }
 
@@ -236,7 +236,8 @@ std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, 
   std::vector<RigidPose> refined;
   std::vector<PoseFit> fits;
   for (const auto& [cost, start] : found) {
-    if (std::ranges::any_of(refined, [&](const RigidPose& pose) { return are_alike(start, pose); })) {
+    if (std::ranges::any_of(refined,
+                            [&](const RigidPose& pose) { return are_alike(start, pose); })) {
       continue;
     }
     refined.push_back(start);

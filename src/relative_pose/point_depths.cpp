@@ -49,7 +49,8 @@ RigidPose rigid_pose(const cv::Matx44d& transform) {
 double depth_at(const cv::Mat1f& depth_m, const PoseView& match, int keypoint) {
   const Keypoint& at = match.features->keypoints[static_cast<std::size_t>(keypoint)];
   const cv::Size working = match.features->working_size_px;
-  const int x = static_cast<int>((static_cast<double>(at.x_px) + 0.5) * depth_m.cols / working.width);
+  const int x =
+      static_cast<int>((static_cast<double>(at.x_px) + 0.5) * depth_m.cols / working.width);
   const int y =
       static_cast<int>((static_cast<double>(at.y_px) + 0.5) * depth_m.rows / working.height);
   if (x < 1 || y < 1 || x + 1 >= depth_m.cols || y + 1 >= depth_m.rows) return 0;
@@ -121,8 +122,8 @@ void set_depths(const PoseView& match, const cv::Mat1f& depth_m, double error_sh
   }
 }
 
-void triangulate(const PoseView& match, std::span<const NearbyView> beside,
-                 double gate, Verifier& verifier, std::vector<RayPair>& pairs) {
+void triangulate(const PoseView& match, std::span<const NearbyView> beside, double gate,
+                 Verifier& verifier, std::vector<RayPair>& pairs) {
   std::map<int, RayPair*> by_feature;
   for (RayPair& pair : pairs) by_feature.emplace(pair.features.place, &pair);
   std::vector<int> asked;

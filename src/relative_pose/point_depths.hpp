@@ -20,8 +20,8 @@ void set_depths(const PoseView& match, const cv::Mat1f& depth_m, double error_sh
 /// Sets the inverse depth of each pair whose keypoint of the match is seen in `beside`, too, by
 /// triangulation with the known poses. Several views must agree. The standard deviation is that of
 /// the keypoints; the poses count as exact. Throws Error (kind input) for a pose that is not rigid.
-void triangulate(const PoseView& match, std::span<const NearbyView> beside,
-                 double gate, Verifier& verifier, std::vector<RayPair>& pairs);
+void triangulate(const PoseView& match, std::span<const NearbyView> beside, double gate,
+                 Verifier& verifier, std::vector<RayPair>& pairs);
 
 /// The longest baseline between the match and a view beside it, m.
 double longest_baseline_m(std::span<const NearbyView> beside);

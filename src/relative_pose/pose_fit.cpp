@@ -35,7 +35,7 @@ Residual epipolar_residual(const RayPair& pair, const RigidPose& pose) {
   const cv::Vec3d& q = pair.query.direction;
   const cv::Matx33d back = pose.rotation.t();
   const cv::Vec3d u = pose.rotation * q;
-  const cv::Vec3d normal = pose.translation.cross(u);          // E q
+  const cv::Vec3d normal = pose.translation.cross(u);              // E q
   const cv::Vec3d back_normal = back * m.cross(pose.translation);  // E^T m
   const cv::Vec2d by_match = pair.match.spread.t() * normal;
   const cv::Vec2d by_query = pair.query.spread.t() * back_normal;
@@ -145,7 +145,8 @@ cv::Matx66d fitted_directions(const RigidPose& pose, FitKind kind) {
   const cv::Vec3d along = pose.rotation.t() * pose.translation;
   for (int a = 0; a < 3; ++a) {
     for (int b = 0; b < 3; ++b) {
-      projection(a, b) = kind == FitKind::rotation ? 0.0 : (a == b ? 1.0 : 0.0) - along[a] * along[b];
+      projection(a, b) =
+          kind == FitKind::rotation ? 0.0 : (a == b ? 1.0 : 0.0) - along[a] * along[b];
     }
   }
   return projection;

@@ -147,7 +147,8 @@ class RelativePoseEstimator::Impl {
     estimate_direction(result);
     if (result.status == PoseStatus::no_geometry) return result;
     // With depths, the length.
-    if (request.match_depth_m != nullptr || !request.beside.empty()) estimate_metric(request, result);
+    if (request.match_depth_m != nullptr || !request.beside.empty())
+      estimate_metric(request, result);
     return result;
   }
 
@@ -181,8 +182,8 @@ class RelativePoseEstimator::Impl {
   }
 
   void name_degenerate_case(const DirectionSearch& found, RelativePose& result) {
-    const PoseFit turn = fit_pose(inliers_, {rotation_between(inliers_), {}}, FitKind::rotation,
-                                  gate(), kFitRounds);
+    const PoseFit turn =
+        fit_pose(inliers_, {rotation_between(inliers_), {}}, FitKind::rotation, gate(), kFitRounds);
     const auto turned = inliers_of(inliers_, turn.pose, FitKind::rotation, 3.0);
     constexpr double kMinShare = 0.9;
     if (static_cast<double>(turned.size()) > kMinShare * static_cast<double>(inliers_.size())) {
@@ -288,10 +289,8 @@ class RelativePoseEstimator::Impl {
   [[nodiscard]] std::vector<RayPair> inliers_with_depth() const {
     std::vector<RayPair> result;
     for (const RayPair& pair : pairs_) {
-      const bool is_inlier =
-          std::ranges::any_of(inliers_, [&](const RayPair& inlier) {
-            return inlier.features == pair.features;
-          });
+      const bool is_inlier = std::ranges::any_of(
+          inliers_, [&](const RayPair& inlier) { return inlier.features == pair.features; });
       if (is_inlier && pair.has_depth()) result.push_back(pair);
     }
     return result;
@@ -301,7 +300,7 @@ class RelativePoseEstimator::Impl {
   Verifier verifier_;
   Verification found_;
   std::vector<RayPair> pairs_;
-  std::vector<RayPair> inliers_;  ///< of the direction
+  std::vector<RayPair> inliers_;   ///< of the direction
   std::vector<RigidPose> starts_;  ///< what the directions say, best first
 };
 

@@ -30,8 +30,8 @@ enum class PoseStatus {
   ambiguous,        ///< two poses explain points in space about equally well: nothing is known
 };
 
-inline constexpr std::array kAllPoseStatuses{PoseStatus::measured,      PoseStatus::few_matches,
-                                             PoseStatus::no_geometry,   PoseStatus::pure_rotation,
+inline constexpr std::array kAllPoseStatuses{PoseStatus::measured,        PoseStatus::few_matches,
+                                             PoseStatus::no_geometry,     PoseStatus::pure_rotation,
                                              PoseStatus::little_parallax, PoseStatus::plane,
                                              PoseStatus::ambiguous};
 
@@ -45,7 +45,7 @@ enum class PoseKnown {
 
 /// What came of the search for the length of the translation.
 enum class ScaleStatus {
-  not_asked,    ///< neither depth nor a baseline was given
+  not_asked,  ///< neither depth nor a baseline was given
   known,
   no_depth,     ///< the match has no depth image, or it is empty
   no_baseline,  ///< the views beside the match were taken from the same point
@@ -132,11 +132,11 @@ struct RelativePose {
 /// Estimates relative poses. It keeps its working memory. Not thread-safe; use one per thread.
 ///
 /// Rays take the place of pixels, so that every lens works. RANSAC on all matches (see
-/// epipolar_inliers()) is followed by nonlinear least squares with a robust loss, from many starting
-/// points, each residual weighted by the noise of its two keypoints.
-/// With depths, each inlier with a depth adds a second equation, and the translation gets a length;
-/// SQPnP is a second starting point. The same input gives the same pose. Cost: 1 ms after the
-/// matches, see scripts/bench_poses.
+/// epipolar_inliers()) is followed by nonlinear least squares with a robust loss, from many
+/// starting points, each residual weighted by the noise of its two keypoints. With depths, each
+/// inlier with a depth adds a second equation, and the translation gets a length; SQPnP is a second
+/// starting point. The same input gives the same pose. Cost: 1 ms after the matches, see
+/// scripts/bench_poses.
 class RelativePoseEstimator {
  public:
   /// Throws Error (kind option) if `options` are not valid.
