@@ -300,7 +300,8 @@ TEST(RelativePose, OnlyDepthMeasuresAPlane) {
             0.2);
 }
 
-/// With noise that is independent the covariance is at most twice too large, and not too small.
+/// It allows for errors that keypoints of one object share. Where the noise is independent, as
+/// here, it is two times too large with depths, and six times without, but never too small.
 TEST(RelativePose, CovarianceCoversTheErrors) {
   constexpr int kScenes = 150;
   Random random;
@@ -318,8 +319,8 @@ TEST(RelativePose, CovarianceCoversTheErrors) {
     ASSERT_EQ(whole.known, PoseKnown::metric) << i;
     metric += nees(whole, scene.T_match_query, 6) / 6 / kScenes;
   }
-  EXPECT_GT(direction, 0.35);
-  EXPECT_LT(direction, 1.0);
+  EXPECT_GT(direction, 0.1);
+  EXPECT_LT(direction, 0.5);
   EXPECT_GT(metric, 0.25);
   EXPECT_LT(metric, 1.0);
 }
@@ -363,6 +364,17 @@ TEST(RelativePose, InformationIsThatOfG2o) {
   const cv::Matx66d direction = g2o_information(pose);
   EXPECT_EQ(direction(0, 0), 0);
   EXPECT_NEAR(direction(3, 3), 100, 1e-9);
+}
+
+TEST(RelativePose, WritesEdgesOfG2o) {
+  RelativePose pose;
+  pose.known = PoseKnown::metric;
+  pose.T_match_query = transform({0, 0, std::numbers::pi / 2}, {1, 2, -3});
+  pose.covariance = cv::Matx66d::eye() * 0.25;
+  EXPECT_TRUE(to_tum_pose(pose).starts_with("1 2 -3 0 0 0.70710678"));
+  const std::string edge = to_g2o_edge(pose, 4, 9);
+  EXPECT_TRUE(edge.starts_with("EDGE_SE3:QUAT 4 9 1 2 -3 0 0 0.70710678")) << edge;
+  EXPECT_TRUE(edge.ends_with(" 4 0 0 0 0 0 4 0 0 0 0 4 0 0 0 16 0 0 16 0 16")) << edge;
 }
 
 TEST(RelativePose, ReadsDepthInMetres) {

@@ -14,8 +14,8 @@ namespace loopbit {
 namespace {
 
 constexpr int kStarts = 16;
-constexpr std::size_t kFewPairs = 60;
-constexpr std::size_t kRefined = 6;
+constexpr std::size_t kFewPairs = 50;
+constexpr std::size_t kRefined = 5;
 constexpr std::size_t kMinInliers = 8;
 /// Before the pose is nearly right, pairs far from it count, too.
 constexpr double kWideGate = 1e3;
@@ -235,7 +235,8 @@ std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, 
   // The best of those that differ, on all pairs.
   std::vector<RigidPose> refined;
   std::vector<PoseFit> fits;
-  for (const auto& [cost, start] : found) {
+  for (const auto& candidate : found) {
+    const RigidPose& start = candidate.second;
     if (std::ranges::any_of(refined,
                             [&](const RigidPose& pose) { return are_alike(start, pose); })) {
       continue;

@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/core/quaternion.hpp>
 
 #include "loopbit/error.hpp"
 
@@ -396,6 +397,26 @@ cv::Matx66d g2o_information(const RelativePose& pose) {
     }
   }
   return information;
+}
+
+std::string to_tum_pose(const RelativePose& pose) {
+  const cv::Matx33d rotation = pose.T_match_query.get_minor<3, 3>(0, 0);
+  const cv::Quatd q = cv::Quatd::createFromRotMat(rotation);
+  const double sign = q.w < 0 ? -1 : 1;
+  const cv::Matx44d& t = pose.T_match_query;
+  return fmt::format("{:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}", t(0, 3), t(1, 3), t(2, 3),
+                     sign * q.x + 0.0, sign * q.y + 0.0, sign * q.z + 0.0,  // not -0
+                     sign * q.w);
+}
+
+std::string to_g2o_edge(const RelativePose& pose, int match, int query) {
+  const cv::Matx66d information = g2o_information(pose);
+  std::string line = fmt::format("EDGE_SE3:QUAT {} {} {}", match, query, to_tum_pose(pose));
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column)
+      line += fmt::format(" {:.9g}", information(row, column));
+  }
+  return line;
 }
 
 }  // namespace loopbit

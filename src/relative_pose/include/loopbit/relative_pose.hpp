@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <tuple>
 #include <vector>
@@ -164,5 +165,13 @@ cv::Mat1f depth_in_metres(const cv::Mat& depth, double units_per_m = 5000);
 /// quaternion's vector is half a rotation vector. What is not known has no information: if only the
 /// direction is known, that is the whole translation, since its length is unknown.
 cv::Matx66d g2o_information(const RelativePose& pose);
+
+/// A pose as the line `EDGE_SE3:QUAT match query x y z qx qy qz qw` and the upper triangle of
+/// g2o_information(), in g2o's text format.
+std::string to_g2o_edge(const RelativePose& pose, int match, int query);
+
+/// Position and unit quaternion `x y z qx qy qz qw` of T_match_query, as TUM trajectories and g2o
+/// write them.
+std::string to_tum_pose(const RelativePose& pose);
 
 }  // namespace loopbit

@@ -150,9 +150,10 @@ class World {
 std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world);
 
 /// Writes the whole drive as a data set: images/000000.png ..., times.txt (seconds), poses.txt
-/// (KITTI: camera to world, 3 x 4 numbers per row, x right, y down, z forward), truth.csv and
-/// not_false.csv. Calls `on_frame(n)` after each image. Throws Error (kind output) if `folder`
-/// already contains images or cannot be written.
+/// (KITTI: camera to world, 3 x 4 numbers per row, x right, y down, z forward), camera.yaml (see
+/// read_cameras(); without the nods of single frames), truth.csv and not_false.csv. Calls
+/// `on_frame(n)` after each image. Throws Error (kind output) if `folder` already contains images
+/// or cannot be written.
 void write_dataset(
     const World& world, const std::string& folder,
     const std::function<void(int)>& on_frame = [](int) {});
