@@ -224,8 +224,8 @@ std::optional<cv::Vec3d> unproject(const CameraModel& camera, const cv::Vec2d& p
                                    cv::Matx32d* jacobian) {
   const cv::Vec2d bent((pixel_px[0] - camera.cx) / camera.fx,
                        (pixel_px[1] - camera.cy) / camera.fy);
-  const auto direction = camera.lens == Lens::equidistant ? unproject_equidistant(camera, bent)
-                                                          : unproject_planar(camera, bent);
+  auto direction = camera.lens == Lens::equidistant ? unproject_equidistant(camera, bent)
+                                                    : unproject_planar(camera, bent);
   if (!direction || jacobian == nullptr) return direction;
   // Its inverse on the plane of directions that keep the unit length.
   cv::Matx23d forward;

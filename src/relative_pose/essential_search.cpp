@@ -161,12 +161,11 @@ cv::Matx33d fit_homography(std::span<const RayPair> pairs, const std::vector<cha
     const cv::Vec3d& q = pairs[k].query.direction;
     const cv::Vec3d& m = pairs[k].match.direction;
     // m x (H q) = 0 sums to (1 - m m^T) times q q^T.
-    for (int a = 0; a < 3; ++a) {
-      for (int b = 0; b < 3; ++b) {
-        const double of_match = (a == b ? 1.0 : 0.0) - m[a] * m[b];
-        for (int i = 0; i < 3; ++i) {
-          for (int j = 0; j < 3; ++j) squares(a * 3 + i, b * 3 + j) += of_match * q[i] * q[j];
-        }
+    const cv::Matx33d of_match = cv::Matx33d::eye() - m * m.t();
+    const cv::Matx33d of_query = q * q.t();
+    for (int row = 0; row < 9; ++row) {
+      for (int column = 0; column < 9; ++column) {
+        squares(row, column) += of_match(row / 3, column / 3) * of_query(row % 3, column % 3);
       }
     }
   }

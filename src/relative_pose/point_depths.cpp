@@ -127,6 +127,7 @@ void triangulate(const PoseView& match, std::span<const NearbyView> beside, doub
   std::map<int, RayPair*> by_feature;
   for (RayPair& pair : pairs) by_feature.emplace(pair.features.place, &pair);
   std::vector<int> asked;
+  asked.reserve(by_feature.size());
   for (const auto& [feature, pair] : by_feature) asked.push_back(feature);
   std::map<int, std::vector<InverseDepth>> estimates;
   Verification seen;

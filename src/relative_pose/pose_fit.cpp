@@ -124,11 +124,11 @@ Equations equations_of(std::span<const RayPair> pairs, const std::vector<char>& 
     const double weight = error <= kHuber ? 1.0 : kHuber / error;
     sum.cost += error <= kHuber ? error * error : kHuber * (2 * error - kHuber);
     for (int row = 0; row < residual.size; ++row) {
-      const double* jacobian = residual.jacobian.val + row * 6;
+      const auto jacobian = residual.jacobian.row(row);
       for (int a = 0; a < 6; ++a) {
-        const double scaled = weight * jacobian[a];
+        const double scaled = weight * jacobian(a);
         sum.gradient[a] += scaled * residual.value[row];
-        for (int b = 0; b <= a; ++b) sum.squares(a, b) += scaled * jacobian[b];
+        for (int b = 0; b <= a; ++b) sum.squares(a, b) += scaled * jacobian(b);
       }
     }
   }

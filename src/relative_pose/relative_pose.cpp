@@ -156,8 +156,8 @@ class RelativePoseEstimator::Impl {
  private:
   [[nodiscard]] double gate() const { return options_.max_error_px / kUsualSigma_px; }
 
-  void report(const PoseFit& fit, FitKind kind, std::span<const RayPair> inliers,
-              RelativePose& result) const {
+  static void report(const PoseFit& fit, FitKind kind, std::span<const RayPair> inliers,
+                     RelativePose& result) {
     const double scale = residual_scale(inliers, fit.pose, kind);
     result.T_match_query = matrix_of(fit.pose);
     result.covariance = fit.covariance;

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 #include <string>
 #include <utility>
 
@@ -238,11 +239,11 @@ cv::Mat1f World::depth_m(int frame) const {
   std::vector<Piece> pieces;
   for (int column = 0; column < camera.width_px; ++column) {
     tracer.trace(column, pieces);
-    for (auto piece = pieces.rbegin(); piece != pieces.rend(); ++piece) {
-      const int first = std::max(0, static_cast<int>(std::floor(piece->top_px)));
-      const int end = std::min(camera.height_px, static_cast<int>(std::ceil(piece->bottom_px)));
+    for (const Piece& piece : std::views::reverse(pieces)) {
+      const int first = std::max(0, static_cast<int>(std::floor(piece.top_px)));
+      const int end = std::min(camera.height_px, static_cast<int>(std::ceil(piece.bottom_px)));
       for (int row = first; row < end; ++row) {
-        depth_m(row, column) = static_cast<float>(tracer.depth_at(*piece, row));
+        depth_m(row, column) = static_cast<float>(tracer.depth_at(piece, row));
       }
     }
   }
