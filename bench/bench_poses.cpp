@@ -214,6 +214,18 @@ struct WorldErrors {
   Errors baseline;
 };
 
+/// The matches of a pair of images, or none if it is no loop.
+std::vector<loopbit::Match> matches_of_loop(const PoseRequest& request) {
+  const Features& query = *request.query.features;
+  const Features& match = *request.match.features;
+  auto matches = loopbit::match_features(query, match, loopbit::RelativePoseOptions().max_ratio);
+  const double error_px = loopbit::VerificationOptions().max_epipolar_error_px;
+  if (loopbit::epipolar_inliers(query, match, matches, error_px).size() < kLoopInliers) {
+    matches.clear();
+  }
+  return matches;
+}
+
 /// Loops of one drive: revisits by ground truth, the nearest place of each.
 void bench_drive(const WorldOptions& options, int every, bool is_plain, WorldErrors& errors) {
   const World world(options);
@@ -241,12 +253,8 @@ void bench_drive(const WorldOptions& options, int every, bool is_plain, WorldErr
     PoseRequest request{.query = {&features_of(run.query), &query_camera},
                         .match = {&features_of(match), &match_camera},
                         .matches = {}};
-    const auto matches =
-        loopbit::match_features(*request.query.features, *request.match.features, 0.85);
-    if (loopbit::epipolar_inliers(*request.query.features, *request.match.features, matches, 2.0)
-            .size() < kLoopInliers) {
-      continue;  // no loop
-    }
+    const auto matches = matches_of_loop(request);
+    if (matches.empty()) continue;
     request.matches = matches;
     errors.monocular.add(timed(estimator, request, errors.monocular), truth);
     // Odometry: the frames before and after the match.
@@ -360,12 +368,8 @@ SequenceErrors bench_sequence(const Sequence& sequence) {
     PoseRequest request{.query = {&features[at(run.query)], &sequence.camera},
                         .match = {&features[at(match)], &sequence.camera},
                         .matches = {}};
-    const auto matches =
-        loopbit::match_features(*request.query.features, *request.match.features, 0.85);
-    if (loopbit::epipolar_inliers(*request.query.features, *request.match.features, matches, 2.0)
-            .size() < kLoopInliers) {
-      continue;  // no loop
-    }
+    const auto matches = matches_of_loop(request);
+    if (matches.empty()) continue;
     request.matches = matches;
     const cv::Matx44d truth = poses[at(match)].inv() * poses[at(run.query)];
     errors.monocular.add(timed(estimator, request, errors.monocular), truth);

@@ -14,6 +14,7 @@
 #include "loopbit/camera_file.hpp"
 #include "loopbit/write_file.hpp"
 
+#include "test_cameras.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -25,21 +26,6 @@ std::ostream& operator<<(std::ostream& stream, const CameraModel& camera) {
 namespace test {
 namespace {
 
-CameraModel pinhole() {
-  return {.size_px = {640, 480}, .fx = 500, .fy = 510, .cx = 315, .cy = 242};
-}
-
-/// EuRoC's left camera.
-CameraModel euroc() {
-  return {.lens = Lens::radial_tangential,
-          .size_px = {752, 480},
-          .fx = 458.654,
-          .fy = 457.296,
-          .cx = 367.215,
-          .cy = 248.375,
-          .distortion = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05}};
-}
-
 /// A wide lens of OpenCV's rational model.
 CameraModel rational() {
   return {.lens = Lens::radial_tangential,
@@ -49,16 +35,6 @@ CameraModel rational() {
           .cx = 640,
           .cy = 355,
           .distortion = {-0.05, 0.01, 0.0004, -0.0006, 0.001, 0.05, 0.005, 0.0005}};
-}
-
-CameraModel fisheye() {
-  return {.lens = Lens::equidistant,
-          .size_px = {640, 480},
-          .fx = 240,
-          .fy = 241,
-          .cx = 322,
-          .cy = 238,
-          .distortion = {-0.012, 0.004, -0.0021, 0.0003}};
 }
 
 std::vector<CameraModel> cameras() { return {pinhole(), euroc(), rational(), fisheye()}; }

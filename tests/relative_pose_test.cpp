@@ -13,6 +13,7 @@
 #include <opencv2/core.hpp>
 
 #include "pose_fit.hpp"
+#include "test_cameras.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -32,27 +33,6 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kScale = 3;  // of each keypoint
-
-CameraModel pinhole() {
-  return {.size_px = {640, 480}, .fx = 450, .fy = 452, .cx = 318, .cy = 243};
-}
-
-CameraModel fisheye() {
-  return {.lens = Lens::equidistant,
-          .size_px = {640, 480},
-          .fx = 240,
-          .fy = 241,
-          .cx = 322,
-          .cy = 238,
-          .distortion = {-0.012, 0.004, -0.0021, 0.0003}};
-}
-
-CameraModel radial() {
-  CameraModel camera = pinhole();
-  camera.lens = Lens::radial_tangential;
-  camera.distortion = {-0.28, 0.07, 0.0002, 0.00002};
-  return camera;
-}
 
 cv::Matx44d transform(const cv::Vec3d& turn, const cv::Vec3d& t) {
   const cv::Matx33d r = rotation_by(turn);
@@ -165,7 +145,7 @@ double nees(const RelativePose& pose, const cv::Matx44d& truth, int freedom) {
 }
 
 TEST(RelativePose, FindsRotationAndDirectionThroughEveryLens) {
-  for (const CameraModel& camera : {pinhole(), radial(), fisheye()}) {
+  for (const CameraModel& camera : {pinhole(), euroc(), fisheye()}) {
     Random random;
     const Scene scene(points_in_space(120, random), camera, usual_motion(), 0, random);
     const RelativePose pose = estimate(scene.request());
@@ -194,7 +174,7 @@ TEST(RelativePose, WithstandsWrongMatches) {
 
 TEST(RelativePose, IsMetricWithDepth) {
   Random random;
-  const Scene scene(points_in_space(120, random), radial(), usual_motion(), 0.5, random);
+  const Scene scene(points_in_space(120, random), euroc(), usual_motion(), 0.5, random);
   const cv::Mat1f depth_m = depth_image(scene);
   PoseRequest request = scene.request();
   request.match_depth_m = &depth_m;

@@ -6,7 +6,6 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
-#include <ranges>
 #include <string>
 #include <utility>
 
@@ -239,7 +238,8 @@ cv::Mat1f World::depth_m(int frame) const {
   std::vector<Piece> pieces;
   for (int column = 0; column < camera.width_px; ++column) {
     tracer.trace(column, pieces);
-    for (const Piece& piece : std::views::reverse(pieces)) {
+    std::reverse(pieces.begin(), pieces.end());  // nearer ones last
+    for (const Piece& piece : pieces) {
       const int first = std::max(0, static_cast<int>(std::floor(piece.top_px)));
       const int end = std::min(camera.height_px, static_cast<int>(std::ceil(piece.bottom_px)));
       for (int row = first; row < end; ++row) {
