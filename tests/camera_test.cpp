@@ -304,9 +304,15 @@ TEST_F(CameraFile, WhatItCannotReadIsAnError) {
   expect_bad("frames: 3\n", "has no camera");
   expect_bad("[1, 2\n", "is not valid YAML");
   expect_bad(std::string(100, '['), "brackets");
+  std::string deep;
+  for (int i = 0; i < 20'000; ++i) deep += "- ";
+  expect_bad(deep, "is not valid YAML");
   expect_bad("intrinsics: [1, 2, 3, 4]\ncamera_model: omni\n", "'omni'");
   expect_bad("intrinsics: [1, 2]\nresolution: [3, 4]\ncamera_model: pinhole\n", "4 intrinsics");
   expect_bad("camera_matrix: [1, 2, 3]\n", "3 numbers");
+  expect_bad("camera_matrix: &a [*a, *a]\n", "a finite number is needed");
+  expect_bad("row: &r [1, 2, 3, 4, 5, 6, 7, 8, 9]\nk: [*r, *r, *r, *r, *r, *r, *r, *r]\n",
+             "too many numbers");
   expect_bad("camera_matrix: {data: [1, 0, .nan, 0, 1, 0, 0, 0, 1]}\n", "'.nan'");
   const std::string matrix = "k: [9, 0, 1, 0, 9, 1, 0, 0, 1]\n";
   expect_bad(matrix + "d: [0, 0, 0, 0, nan]\n", "'nan'");

@@ -23,6 +23,8 @@ namespace fs = std::filesystem;
 constexpr std::uintmax_t kMaxCameraFileBytes = std::uintmax_t{1} << 20U;
 /// The YAML reader recurses; calibrations need three levels.
 constexpr int kMaxNesting = 32;
+/// Of a list: a few lines with aliases can stand for millions.
+constexpr std::size_t kMaxNumbers = 64;
 
 constexpr const char* kExpected =
     "give a sensor.yaml of EuRoC, a camchain.yaml of Kalibr, a camera_info of ROS, a YAML file of "
@@ -41,12 +43,15 @@ class CameraFile {
     const YAML::Node data = node.IsMap() ? node["data"] : node;
     if (!data || !data.IsSequence()) fail(fmt::format("has no list of numbers in '{}'", name));
     std::vector<double> numbers;
+    const auto add = [&](const YAML::Node& cell) {
+      if (numbers.size() == kMaxNumbers) fail(fmt::format("has too many numbers in '{}'", name));
+      numbers.push_back(number(cell, name));
+    };
     for (const YAML::Node& cell : data) {
-      if (cell.IsSequence()) {
-        const auto row = this->numbers(cell, name);
-        numbers.insert(numbers.end(), row.begin(), row.end());
+      if (cell.IsSequence()) {  // a row of a matrix
+        for (const YAML::Node& inner : cell) add(inner);
       } else {
-        numbers.push_back(number(cell, name));
+        add(cell);
       }
     }
     return numbers;
