@@ -10,7 +10,7 @@ set(root ${PROJECT_SOURCE_DIR})
 set(CPACK_SOURCE_IGNORE_FILES "^${root}/build/" "^${root}/loopbit_demo/" "^${root}/[.]git(/|$)" /node_modules/
                               /dist/ /__pycache__/ [.]egg-info/ "^${root}/python/loopbit/.*[.]so$")
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL lib map images data dev tools python)
+set(CPACK_COMPONENTS_ALL lib map images poses data dev tools python)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
@@ -41,6 +41,12 @@ set(CPACK_DEBIAN_IMAGES_PACKAGE_DEPENDS "libloopbit${abi} ${this}")
 set(CPACK_DEBIAN_IMAGES_DESCRIPTION "${summary}: images
  Reads images from files, folders, lists, videos and cameras.")
 
+set(CPACK_DEBIAN_POSES_PACKAGE_NAME libloopbit-poses${abi})
+set(CPACK_DEBIAN_POSES_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_POSES_PACKAGE_DEPENDS "libloopbit${abi} ${this}")
+set(CPACK_DEBIAN_POSES_DESCRIPTION "${summary}: relative poses
+ Reads camera calibrations and measures the relative pose of two images.")
+
 set(CPACK_DEBIAN_DATA_PACKAGE_NAME libloopbit-data${abi})
 set(CPACK_DEBIAN_DATA_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS
@@ -51,14 +57,14 @@ set(CPACK_DEBIAN_DATA_DESCRIPTION "${summary}: data sets, scores, reports
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libloopbit-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-data${abi} ${this}, libopencv-dev")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-data${abi} ${this}, libopencv-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "${summary}: headers
  For programs that use loopbit, with CMake or pkg-config.")
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME loopbit)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-data${abi} ${this}")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-data${abi} ${this}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "${summary}: the command
  Finds loops in image sequences, scores and shows them.")
 

@@ -20,6 +20,12 @@ cmake --build "$scratch/build"
 "$scratch/build/keyframe_slam" "$scratch/town/images" | tee "$scratch/edges"
 grep -q '^edge [0-9]* -> [0-9]*, score' "$scratch/edges"
 
+# Odometry that is exact: most loops become edges with a length, and a turn of a few degrees.
+"$scratch/build/odometry_edges" "$scratch/town/images" "$scratch/town/poses.txt" \
+  "$scratch/town/camera.yaml" >"$scratch/measured_edges"
+(($(grep -c '^EDGE_SE3:QUAT [0-9]* [0-9]* ' "$scratch/measured_edges") >= 10))
+[[ $(awk '{ print NF }' "$scratch/measured_edges" | sort -u) == 31 ]]
+
 # An image that is too small and one that is none change no other frame's number.
 cp -r "$scratch/town/images" "$scratch/odd"
 { printf 'P5\n16 16\n255\n' && head -c 256 <(seq 100); } >"$scratch/odd/000003.png"

@@ -32,6 +32,7 @@ link loopbit
 link loopbit_map -lloopbit
 link loopbit_images -lloopbit
 link loopbit_recordings -lloopbit_images -lloopbit_map -lloopbit
+link loopbit_poses -lloopbit -lopencv_calib3d -lyaml-cpp
 link loopbit_data -lloopbit_images -lloopbit_map -lloopbit
 link loopbit_report -lloopbit_data -lloopbit_images -lloopbit_map -lloopbit
 

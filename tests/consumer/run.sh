@@ -41,18 +41,20 @@ components() {
     -DCMAKE_PREFIX_PATH="$prefix" "$@" | tee "$scratch/found"
 }
 components
-for component in loopbit images map recordings data both; do
+for component in loopbit images poses map recordings data both; do
   grep -qxF -e "-- found $component" "$scratch/found"
 done
 if [[ $is_static ]]; then
   components -DCMAKE_DISABLE_FIND_PACKAGE_ZLIB=ON
-  [[ $(grep -e '-- found' "$scratch/found") == $'-- found loopbit\n-- found images\n-- found map' ]]
+  [[ $(grep -e '-- found' "$scratch/found") == $'-- found loopbit\n-- found images\n-- found poses\n-- found map' ]]
   grep -qF -e '-- not both: loopbit::data is not there: zlib or matio' "$scratch/found"
   for without in -DCMAKE_DISABLE_FIND_PACKAGE_{SQLite3,PkgConfig}=ON; do
     components "$without"
-    [[ $(grep -e '-- found' "$scratch/found") == $'-- found loopbit\n-- found images' ]]
+    [[ $(grep -e '-- found' "$scratch/found") == $'-- found loopbit\n-- found images\n-- found poses' ]]
     grep -qF -e '-- not both: loopbit::data is not there: SQLite or libdeflate' "$scratch/found"
   done
+  components -DCMAKE_DISABLE_FIND_PACKAGE_yaml-cpp=ON
+  [[ $(grep -e '-- found' "$scratch/found") == $'-- found loopbit\n-- found images\n-- found map'* ]]
 fi
 
 if grep -rE -e '-m(avx|sse|arch|tune)' "$prefix"/lib/{,*/}{cmake/loopbit,pkgconfig/loopbit*} 2>/dev/null; then

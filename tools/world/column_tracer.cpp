@@ -199,6 +199,24 @@ void ColumnTracer::add_board(const Hit& hit, float skyline_px, std::vector<Piece
   if (piece.top_px < piece.bottom_px) pieces.push_back(piece);
 }
 
+double ColumnTracer::depth_at(const Piece& piece, int row) const {
+  const double rise = (camera_.horizon_px - (row + 0.5)) / camera_.focal_px;
+  switch (piece.kind) {
+    case Piece::Kind::board:
+      return 0;
+    case Piece::Kind::wall:
+      return piece.depth_m;
+    case Piece::Kind::ground:
+      return std::clamp(-camera_.eye_m / std::min(rise, -1e-9), piece.depth_m, piece.end_m);
+    case Piece::Kind::slope:
+      break;
+  }
+  const double base = piece.height_m - piece.climb * piece.depth_m - camera_.eye_m;
+  const double relative = rise - piece.climb;
+  return std::clamp(std::abs(relative) > 1e-9 ? base / relative : piece.end_m, piece.depth_m,
+                    piece.end_m);
+}
+
 float ColumnTracer::trace(int column, std::vector<Piece>& pieces) const {
   std::vector<Hit> hits;
   collect(column, hits);

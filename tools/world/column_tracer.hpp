@@ -57,6 +57,9 @@ class ColumnTracer {
   /// Returns the row above which the column sees the sky. Overwrites `pieces`.
   float trace(int column, std::vector<Piece>& pieces) const;
 
+  /// The depth at which the middle of `row` sees `piece`. 0 for billboards, which have holes.
+  [[nodiscard]] double depth_at(const Piece& piece, int row) const;
+
  private:
   struct Hit;
   struct Span {

@@ -113,6 +113,7 @@ struct World::Plan {
   ~Plan() = default;
 
   [[nodiscard]] Camera camera(int frame) const;
+  [[nodiscard]] Scene scene(int frame, Vec2 eye) const;
   [[nodiscard]] float from_second_lap(int frame, double factor) const {
     return drive.lap(frame) > 0 ? static_cast<float>(factor) : 0.0F;
   }
@@ -141,6 +142,15 @@ Camera World::Plan::camera(int frame) const {
   const double nod = smooth_noise(seed ^ kNodSalt, frame / kNodFrames) - 0.5;
   camera.horizon_px = kHorizon * options.height_px + nod * kNod_px * options.width_px / 640.0;
   return camera;
+}
+
+Scene World::Plan::scene(int frame, Vec2 eye) const {
+  Scene scene;
+  town.add_surroundings(eye, scene);
+  traffic.add_to(frame, scene);
+  const float season = from_second_lap(frame, options.season);
+  if (season > 0) change_season(scene, season);
+  return scene;
 }
 
 std::vector<View> World::Plan::views() const {
@@ -199,14 +209,52 @@ bool World::blank(int frame) const {
   return plan_->drive.blank(frame);
 }
 
-cv::Mat World::render(int frame) const {
+CameraModel World::camera(int frame) const {
   assert(frame >= 0 && frame < options().frames);
   const Camera camera = plan_->camera(frame);
-  Scene scene;
-  plan_->town.add_surroundings(camera.eye, scene);
-  plan_->traffic.add_to(frame, scene);
-  const float season = plan_->from_second_lap(frame, options().season);
-  if (season > 0) change_season(scene, season);
+  // A pixel's middle is half a pixel from its edges, from which the tracer counts.
+  return {.size_px = {camera.width_px, camera.height_px},
+          .fx = camera.focal_px,
+          .fy = camera.focal_px,
+          .cx = camera.width_px / 2.0 - 0.5,
+          .cy = camera.horizon_px - 0.5};
+}
+
+cv::Matx44d World::T_world_camera(int frame) const {
+  assert(frame >= 0 && frame < options().frames);
+  const Camera camera = plan_->camera(frame);
+  const Vec2 ahead = camera.forward;
+  const Vec2 right = left_of(ahead) * -1.0;
+  return {right.x, 0, ahead.x, camera.eye.x, 0, 1, 0, -camera.eye_m,
+          right.y, 0, ahead.y, camera.eye.y, 0, 0, 0, 1};
+}
+
+cv::Mat1f World::depth_m(int frame) const {
+  assert(frame >= 0 && frame < options().frames);
+  const Camera camera = plan_->camera(frame);
+  const Scene scene = plan_->scene(frame, camera.eye);
+  const ColumnTracer tracer(camera, scene);
+  cv::Mat1f depth_m(camera.height_px, camera.width_px, 0.0F);
+  std::vector<Piece> pieces;
+  for (int column = 0; column < camera.width_px; ++column) {
+    tracer.trace(column, pieces);
+    std::reverse(pieces.begin(), pieces.end());  // nearer ones last
+    for (const Piece& piece : pieces) {
+      const int first = std::max(0, static_cast<int>(std::floor(piece.top_px)));
+      const int end = std::min(camera.height_px, static_cast<int>(std::ceil(piece.bottom_px)));
+      for (int row = first; row < end; ++row) {
+        depth_m(row, column) = static_cast<float>(tracer.depth_at(piece, row));
+      }
+    }
+  }
+  return depth_m;
+}
+
+cv::Mat World::render(int frame, double right_m) const {
+  assert(frame >= 0 && frame < options().frames);
+  Camera camera = plan_->camera(frame);
+  camera.eye = camera.eye + left_of(camera.forward) * -right_m;
+  const Scene scene = plan_->scene(frame, camera.eye);
   const Light light =
       light_of_lap(plan_->seed, plan_->drive.lap(frame), plan_->options.light_change,
                    plan_->from_second_lap(frame, options().night));

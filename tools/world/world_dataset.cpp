@@ -11,6 +11,7 @@
 #include <fmt/ostream.h>
 #include <opencv2/imgcodecs.hpp>
 
+#include "loopbit/camera_file.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/world.hpp"
 #include "loopbit/write_file.hpp"
@@ -84,6 +85,16 @@ std::string kitti_row(const Pose& pose) {
                      s, pose.y_m);
 }
 
+/// That of the whole drive: the nods of single frames are left out.
+CameraModel mean_camera(const World& world) {
+  const int frames = world.options().frames;
+  CameraModel camera = world.camera(0);
+  double sum = 0;
+  for (int frame = 0; frame < frames; ++frame) sum += world.camera(frame).cy;
+  camera.cy = sum / frames;
+  return camera;
+}
+
 template <typename RowOf>
 void write_rows(const fs::path& path, int frames, const RowOf& row_of) {
   std::ofstream file(path);
@@ -110,6 +121,7 @@ void write_dataset(const World& world, const std::string& folder,
   write_rows(root / "times.txt", frames,
              [&](int frame) { return fmt::format("{:.6f}\n", World::time_s(frame)); });
   write_rows(root / "poses.txt", frames, [&](int frame) { return kitti_row(world.pose(frame)); });
+  write_file((root / "camera.yaml").string(), to_camera_info(mean_camera(world)));
   write_place_runs(root / "truth.csv", "query, first and last true earlier frame",
                    world.same_place());
   write_place_runs(root / "not_false.csv",

@@ -11,6 +11,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "loopbit/camera.hpp"
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/options.hpp"
@@ -113,8 +114,18 @@ class World {
   /// Whether `frame` lies between the plain walls.
   [[nodiscard]] bool blank(int frame) const;
 
-  /// The camera image: BGR, 8 bits per channel. About 25 ms on one core for 640 x 480.
-  [[nodiscard]] cv::Mat render(int frame) const;
+  /// The camera of `frame`. It is level, and its nods shift the principal point.
+  [[nodiscard]] CameraModel camera(int frame) const;
+  /// From the frame of the camera to the world: x east, y down, z north, the ground at y = 0.
+  [[nodiscard]] cv::Matx44d T_world_camera(int frame) const;
+
+  /// The camera image: BGR, 8 bits per channel. About 25 ms on one core for 640 x 480. `right_m`:
+  /// as a second camera sees it, that far to the right of the first.
+  [[nodiscard]] cv::Mat render(int frame, double right_m = 0) const;
+
+  /// The depth along the camera's axis for each pixel, m. 0 in the sky and where something flat, a
+  /// tree or a person, stands before it.
+  [[nodiscard]] cv::Mat1f depth_m(int frame) const;
 
   /// All pairs of frames that show the same place: camera centres at most same_place_m apart,
   /// headings at most 30 degrees apart (or 30 degrees from opposite, if opposite_counts), and at
@@ -139,9 +150,10 @@ class World {
 std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world);
 
 /// Writes the whole drive as a data set: images/000000.png ..., times.txt (seconds), poses.txt
-/// (KITTI: camera to world, 3 x 4 numbers per row, x right, y down, z forward), truth.csv and
-/// not_false.csv. Calls `on_frame(n)` after each image. Throws Error (kind output) if `folder`
-/// already contains images or cannot be written.
+/// (KITTI: camera to world, 3 x 4 numbers per row, x right, y down, z forward), camera.yaml (see
+/// read_cameras(); without the nods of single frames), truth.csv and not_false.csv. Calls
+/// `on_frame(n)` after each image. Throws Error (kind output) if `folder` already contains images
+/// or cannot be written.
 void write_dataset(
     const World& world, const std::string& folder,
     const std::function<void(int)>& on_frame = [](int) {});

@@ -1,0 +1,276 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "pose_fit.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+namespace loopbit {
+namespace {
+
+constexpr double kHuber = 1.5;  // standard deviations
+constexpr int kMaxSteps = 8;
+
+using Jacobian = cv::Matx<double, 2, 6>;
+
+/// Two unit vectors across `direction` and each other, as rows.
+cv::Matx23d across(const cv::Vec3d& direction) {
+  const cv::Vec3d axis = std::abs(direction[0]) < 0.6 ? cv::Vec3d(1, 0, 0) : cv::Vec3d(0, 1, 0);
+  const cv::Vec3d u = cv::normalize(direction.cross(axis));
+  const cv::Vec3d v = direction.cross(u);
+  return {u[0], u[1], u[2], v[0], v[1], v[2]};
+}
+
+cv::Matx33d cross_matrix(const cv::Vec3d& v) {
+  return {0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0};
+}
+
+/// match . (translation x rotation query) = 0, divided by its standard deviation. The derivative of
+/// that deviation is left out.
+Residual epipolar_residual(const RayPair& pair, const RigidPose& pose) {
+  const cv::Vec3d& m = pair.match.direction;
+  const cv::Vec3d& q = pair.query.direction;
+  const cv::Matx33d back = pose.rotation.t();
+  const cv::Vec3d u = pose.rotation * q;
+  const cv::Vec3d normal = pose.translation.cross(u);              // E q
+  const cv::Vec3d back_normal = back * m.cross(pose.translation);  // E^T m
+  const cv::Vec2d by_match = pair.match.spread.t() * normal;
+  const cv::Vec2d by_query = pair.query.spread.t() * back_normal;
+  const double sigma = std::sqrt(by_match.dot(by_match) + by_query.dot(by_query));
+  if (!(sigma > 0)) return {};
+  const cv::Vec3d by_translation = back * u.cross(m) / sigma;
+  const cv::Vec3d by_rotation = q.cross(back_normal) / sigma;
+  Residual residual;
+  residual.size = 1;
+  residual.value = {m.dot(normal) / sigma, 0};
+  for (int i = 0; i < 3; ++i) {
+    residual.jacobian(0, i) = by_translation[i];
+    residual.jacobian(0, i + 3) = by_rotation[i];
+  }
+  return residual;
+}
+
+/// Where the query sees the point at the pair's depth (at infinity, for rotation alone), across its
+/// ray, divided by the standard deviations.
+Residual point_residual(const RayPair& pair, const RigidPose& pose) {
+  const cv::Matx33d back = pose.rotation.t();
+  const cv::Vec3d& m = pair.match.direction;
+  const cv::Vec3d seen = back * (m - pair.inverse_depth * pose.translation);
+  const double length = cv::norm(seen);
+  if (!(length > 0)) return {};
+  const cv::Vec3d direction = seen / length;
+  const cv::Vec3d& q = pair.query.direction;
+  if (direction.dot(q) <= 0) {  // behind the camera: far from any inlier
+    Residual behind;
+    behind.size = 2;
+    behind.value = {1e3, 1e3};
+    return behind;
+  }
+  const cv::Matx23d plane = across(q);
+  const cv::Matx23d by_seen =
+      plane * (cv::Matx33d::eye() - direction * direction.t()) * (1 / length);
+  const cv::Matx22d by_query = plane * pair.query.spread;
+  const cv::Vec2d by_inverse_depth = by_seen * (back * pose.translation);
+  const cv::Matx22d by_match =
+      by_seen * back * pair.match.spread - by_inverse_depth * pair.inverse_depth_by_match.t();
+  const cv::Vec2d by_depth = by_inverse_depth * pair.inverse_depth_sigma;
+  const cv::Matx22d covariance =
+      by_query * by_query.t() + by_match * by_match.t() + by_depth * by_depth.t();
+  // The inverse of its Cholesky factor.
+  const double l00 = std::sqrt(covariance(0, 0));
+  const double l10 = covariance(1, 0) / l00;
+  const double l11 = std::sqrt(std::max(covariance(1, 1) - l10 * l10, 1e-30));
+  const cv::Matx22d whiten(1 / l00, 0, -l10 / (l00 * l11), 1 / l11);
+  const cv::Matx23d whole = whiten * by_seen;
+  const cv::Matx23d by_rotation = whole * cross_matrix(seen);  // of R^T: -[r] seen = seen x r
+  const cv::Matx23d by_translation = whole * (-pair.inverse_depth);
+  Residual residual;
+  residual.size = 2;
+  residual.value = whiten * (plane * direction);
+  for (int row = 0; row < 2; ++row) {
+    for (int i = 0; i < 3; ++i) {
+      residual.jacobian(row, i) = by_translation(row, i);
+      residual.jacobian(row, i + 3) = by_rotation(row, i);
+    }
+  }
+  return residual;
+}
+
+RigidPose moved(const RigidPose& pose, const cv::Vec6d& step, FitKind kind) {
+  RigidPose result;
+  result.rotation = pose.rotation * rotation_by({step[3], step[4], step[5]});
+  result.translation = pose.translation + pose.rotation * cv::Vec3d(step[0], step[1], step[2]);
+  if (kind == FitKind::direction) result.translation = cv::normalize(result.translation);
+  return result;
+}
+
+/// J^T W J, J^T W r and the robust cost of the pairs in use.
+struct Equations {
+  cv::Matx66d squares = cv::Matx66d::zeros();
+  cv::Vec6d gradient;
+  double cost = 0;
+};
+
+Equations equations_of(std::span<const RayPair> pairs, const std::vector<char>& is_used,
+                       const RigidPose& pose, FitKind kind) {
+  Equations sum;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (is_used[i] == 0) continue;
+    const Residual residual = residual_of(pairs[i], pose, kind);
+    const double error = std::sqrt(residual.norm_sq());
+    const double weight = error <= kHuber ? 1.0 : kHuber / error;
+    sum.cost += error <= kHuber ? error * error : kHuber * (2 * error - kHuber);
+    for (int row = 0; row < residual.size; ++row) {
+      const auto jacobian = residual.jacobian.row(row);
+      for (int a = 0; a < 6; ++a) {
+        const double scaled = weight * jacobian(a);
+        sum.gradient[a] += scaled * residual.value[row];
+        for (int b = 0; b <= a; ++b) sum.squares(a, b) += scaled * jacobian(b);
+      }
+    }
+  }
+  for (int a = 0; a < 6; ++a) {
+    for (int b = 0; b < a; ++b) sum.squares(b, a) = sum.squares(a, b);
+  }
+  return sum;
+}
+
+/// The directions that are not fitted, as a projection on those that are.
+cv::Matx66d fitted_directions(const RigidPose& pose, FitKind kind) {
+  cv::Matx66d projection = cv::Matx66d::eye();
+  if (kind == FitKind::metric) return projection;
+  const cv::Vec3d along = pose.rotation.t() * pose.translation;
+  for (int a = 0; a < 3; ++a) {
+    for (int b = 0; b < 3; ++b) {
+      projection(a, b) =
+          kind == FitKind::rotation ? 0.0 : (a == b ? 1.0 : 0.0) - along[a] * along[b];
+    }
+  }
+  return projection;
+}
+
+/// The inverse on what is fitted, and 0 elsewhere.
+cv::Matx66d inverse_within(const cv::Matx66d& squares, const cv::Matx66d& projection) {
+  const double size = std::max(cv::trace(squares) / 6, std::numeric_limits<double>::min());
+  const cv::Matx66d rest = (cv::Matx66d::eye() - projection) * size;
+  bool is_ok = false;
+  const cv::Matx66d inverse =
+      (projection * squares * projection + rest).inv(cv::DECOMP_CHOLESKY, &is_ok);
+  if (!is_ok) return cv::Matx66d::eye() * 1e6;
+  return projection * inverse * projection;
+}
+
+/// Keypoints of one object err together: its outline turns, its shadow moves. So what counts as
+/// independent is not a pair but a cluster of them, by where the query sees them (Liang and Zeger
+/// 1986: cluster-robust "sandwich" covariance).
+cv::Matx66d covariance_of(std::span<const RayPair> pairs, const std::vector<char>& is_used,
+                          const RigidPose& pose, FitKind kind) {
+  constexpr double kCell = 0.15;  // of a direction
+  std::map<std::array<int, 3>, cv::Vec6d> clusters;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (is_used[i] == 0) continue;
+    const Residual residual = residual_of(pairs[i], pose, kind);
+    const double error = std::sqrt(residual.norm_sq());
+    const double weight = error <= kHuber ? 1.0 : kHuber / error;
+    const cv::Vec3d cell = pairs[i].query.direction / kCell;
+    cv::Vec6d& sum = clusters[{cvFloor(cell[0]), cvFloor(cell[1]), cvFloor(cell[2])}];
+    for (int row = 0; row < residual.size; ++row) {
+      for (int a = 0; a < 6; ++a) {
+        sum[a] += weight * residual.value[row] * residual.jacobian(row, a);
+      }
+    }
+  }
+  cv::Matx66d spread = cv::Matx66d::zeros();
+  for (const auto& [cell, sum] : clusters) spread += sum * sum.t();
+  const Equations at = equations_of(pairs, is_used, pose, kind);
+  const cv::Matx66d inverse = inverse_within(at.squares, fitted_directions(pose, kind));
+  const double unknown = kind == FitKind::rotation ? 3 : kind == FitKind::direction ? 5 : 6;
+  const auto count = static_cast<double>(clusters.size());
+  const double correction = count / std::max(count - unknown, 1.0);
+  // Without depths, errors of whole objects bend the direction further than their clusters show.
+  constexpr double kDirectionVariance = 3;  // by the built-in world, see docs/poses.md
+  const double inflation = kind == FitKind::direction ? kDirectionVariance : 1.0;
+  return (inverse * spread * inverse * correction + inverse) * inflation;
+}
+
+/// Steps until the cost no longer falls.
+void descend(std::span<const RayPair> pairs, const std::vector<char>& is_used, FitKind kind,
+             RigidPose& pose) {
+  double damping = 1e-4;
+  Equations at = equations_of(pairs, is_used, pose, kind);
+  for (int step = 0; step < kMaxSteps; ++step) {
+    cv::Matx66d damped = at.squares;
+    for (int i = 0; i < 6; ++i) damped(i, i) *= 1 + damping;
+    const cv::Vec6d motion = -(inverse_within(damped, fitted_directions(pose, kind)) * at.gradient);
+    const RigidPose next = moved(pose, motion, kind);
+    const Equations there = equations_of(pairs, is_used, next, kind);
+    if (!(there.cost < at.cost)) {
+      if (damping > 1) return;
+      damping *= 100;
+      continue;
+    }
+    const double gain = at.cost - there.cost;
+    pose = next;
+    at = there;
+    damping = std::max(damping / 10, 1e-7);
+    if (gain < 1e-4 * at.cost) return;
+  }
+}
+
+}  // namespace
+
+cv::Matx33d rotation_by(const cv::Vec3d& r) {
+  const double angle_sq = r.dot(r);
+  const cv::Matx33d k = cross_matrix(r);
+  if (angle_sq < 1e-16) return cv::Matx33d::eye() + k;
+  const double angle = std::sqrt(angle_sq);
+  return cv::Matx33d::eye() + k * (std::sin(angle) / angle) +
+         k * k * ((1 - std::cos(angle)) / angle_sq);
+}
+
+Residual residual_of(const RayPair& pair, const RigidPose& pose, FitKind kind) {
+  const bool has_point = kind == FitKind::metric && pair.has_depth();
+  if (kind == FitKind::rotation || has_point) return point_residual(pair, pose);
+  return epipolar_residual(pair, pose);
+}
+
+double epipolar_error_sq(const RayPair& pair, const cv::Matx33d& essential) {
+  const cv::Vec3d normal = essential * pair.query.direction;
+  const cv::Vec3d back_normal = essential.t() * pair.match.direction;
+  const cv::Vec2d by_match = pair.match.spread.t() * normal;
+  const cv::Vec2d by_query = pair.query.spread.t() * back_normal;
+  const double error = pair.match.direction.dot(normal);
+  const double variance = by_match.dot(by_match) + by_query.dot(by_query);
+  return variance > 0 ? error * error / variance : std::numeric_limits<double>::max();
+}
+
+cv::Matx33d essential_matrix(const RigidPose& pose) {
+  return cross_matrix(pose.translation) * pose.rotation;
+}
+
+PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind kind, double gate,
+                 int rounds) {
+  PoseFit fit{.pose = start, .covariance = cv::Matx66d::zeros()};
+  if (kind == FitKind::rotation) fit.pose.translation = {};
+  std::vector<char> is_used(pairs.size());
+  const auto gate_pairs = [&] {
+    fit.cost = 0;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const double error_sq = residual_of(pairs[i], fit.pose, kind).norm_sq();
+      is_used[i] = error_sq <= gate * gate ? 1 : 0;
+      fit.cost += std::min(error_sq, gate * gate);
+    }
+  };
+  for (int round = 0; round < rounds; ++round) {
+    gate_pairs();
+    descend(pairs, is_used, kind, fit.pose);
+  }
+  gate_pairs();
+  fit.covariance = covariance_of(pairs, is_used, fit.pose, kind);
+  return fit;
+}
+
+}  // namespace loopbit
