@@ -64,6 +64,13 @@ constexpr double kFullExcess = 4;
 /// No frame can say more.
 constexpr double kMaxLogRatio = 30;
 
+/// To about a billionth: mathematical functions may differ in the last bit between processors, and
+/// answers must not.
+double rounded(double value) {
+  constexpr double kScale = 1 << 30;
+  return std::round(value * kScale) / kScale;
+}
+
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -108,16 +115,12 @@ void return_to(const std::vector<PlaceFilter::Observed>& observed, std::ptrdiff_
                PlaceFilter::Belief& prior) {
   const double share = kReturn * prior.elsewhere() /
                        (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
-  std::ptrdiff_t last = 0;
-  bool is_first = true;
   std::vector<std::ptrdiff_t> steps;
   steps.reserve(observed.size());
   for (const auto& o : observed) steps.push_back(o.step);
-  std::sort(steps.begin(), steps.end());
+  std::ranges::sort(steps);
+  steps.erase(std::ranges::unique(steps).begin(), steps.end());
   for (const std::ptrdiff_t step : steps) {
-    if (!is_first && step == last) continue;
-    is_first = false;
-    last = step;
     PlaceFilter::Hypothesis& at = hypothesis_at(prior.places, step);
     at.forward += share;
     at.backward += share;
@@ -236,7 +239,7 @@ double PlaceFilter::Belief::at(std::ptrdiff_t step) const {
 }
 
 double PlaceFilter::Observed::log_likelihood_ratio() const {
-  return std::min(kMaxLogRatio, terms.votes + terms.geometry);
+  return rounded(std::min(kMaxLogRatio, terms.votes + terms.geometry));
 }
 
 PlaceFilter::Belief PlaceFilter::predict(bool is_step) const {
@@ -363,6 +366,8 @@ PlaceFilter::Update PlaceFilter::update(
                 [](const Hypothesis& h) { return h.probability() < kMinProbability; });
   update.prior = std::move(prior);
   choose_match(num_steps, loops, update);
+  update.probability = rounded(update.probability);
+  update.revisit = rounded(update.revisit);
   return update;
 }
 
