@@ -52,9 +52,8 @@ constexpr double kShownPrior = 5;
 /// A true place has some ten inliers beyond chance where geometry sees any, which is every second
 /// frame.
 constexpr double kGeometryDensity = 0.5 / 10;
-/// Inliers, votes and the inliers' own spread speak of the same pixels. What they say together
-/// counts less than the product.
-constexpr double kGeometryWeight = 0.7;
+/// Inliers of a wrong place persist half as long along a path as its votes.
+constexpr double kGeometryIndependence = 2;
 /// How rare a thing is can be known no better than by one in so many steps: inliers count fully
 /// once the map has so many, and before in proportion to the logarithm.
 constexpr double kFullSteps = 200;
@@ -293,13 +292,17 @@ std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>
   return sigmas;
 }
 
-/// Consecutive frames are not independent witnesses: the more alike wrong places look from one step
-/// to the next, the less each counts.
-double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null) const {
+/// Consecutive frames are not independent witnesses: the more alike a wrong place looks from one
+/// step to the next, the less each of them counts.
+double PlaceFilter::independence() const {
   const double correlation = std::clamp(same_path_products_ / same_path_squares_, 0.0, 0.95);
+  return (1 - correlation) / (1 + correlation);
+}
+
+double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null) const {
   const auto degrees = static_cast<double>(std::min(kMaxDegrees, num_null - 1));
   const double ratio = shifted_normal(sigmas, kMeanSigmas) / student_t(sigmas, degrees);
-  return (1 - correlation) / (1 + correlation) * std::log(ratio);
+  return independence() * std::log(ratio);
 }
 
 /// The tail of wrong places is a Lomax distribution: an exponential one whose mean is only as well
@@ -314,7 +317,7 @@ double PlaceFilter::geometry_log_ratio(double evidence, std::ptrdiff_t num_steps
   const double at_beginning =
       std::log(steps * kGeometryDensity * tail_.excess / (rate * tail_.count));
   const double growth = (tail_.count + 1) * std::log1p(excess / tail_.excess);
-  return kGeometryWeight *
+  return std::min(1.0, kGeometryIndependence * independence()) *
          std::max(0.0, growth + std::min(1.0, excess / kFullExcess) * at_beginning);
 }
 
