@@ -287,7 +287,7 @@ class EvaluationCommandTest(CommandTest):
 
     def test_runs_stand_side_by_side(self):
         strict = self.scratch / "strict"
-        ran = loopbit("run", self.images, "--out", strict, "--set", "decision.min_score=60")
+        ran = loopbit("run", self.images, "--out", strict, "--set", "decision.min_score=0.999999")
         self.assertEqual(ran.returncode, 0, ran.stderr)
         other = self.file("dbow2.csv", "query,match,score\n30,1,0.5\n")
         page = self.scratch / "page.html"

@@ -204,7 +204,7 @@ TEST_F(MapFile, ALinkIsTheMapThatItNames) {
 TEST_F(MapFile, AMapMadeWithOtherSettingsIsRefused) {
   add_session(map_path_, 1);
   LoopDetectorOptions options = fast_options();
-  options.decision.min_score = 99;  // shapes no place
+  options.decision.min_score = 0.9;  // shapes no place
   { const MapWriter map(map_path_, options, "drive"); }
   options.surf.max_keypoints = 200;
   expect_error(ErrorKind::option,

@@ -285,7 +285,7 @@ LoopDetectorOptions changed_options() {
   options.surf = {8000, 123, false};
   options.verification = {40, 3, 0.75, 11, 1.3, 4.5};
   options.exclusion = {5, 40, 0.0, 17};
-  options.decision = {33.3, 0.2, 99, 55, false, 6.5, 0.1, 0.5, true};
+  options.decision = {0.875, true};
   return options;
 }
 
@@ -298,7 +298,8 @@ TEST(OptionsJson, HoldsChangedValues) {
   EXPECT_FALSE(read.surf.upright);
   EXPECT_EQ(read.verification.max_ratio, 0.75);
   EXPECT_EQ(read.exclusion.frames, 40);
-  EXPECT_EQ(read.decision.min_score, 33.3);
+  EXPECT_EQ(read.decision.min_score, 0.875);
+  EXPECT_TRUE(read.decision.count_matches);
 }
 
 TEST(OptionsJson, WhatIsNotNamedKeepsItsDefault) {

@@ -98,8 +98,7 @@ class Refusal {
 LoopDetectorOptions small_options() {
   LoopDetectorOptions options;
   options.surf = {.working_area_px = 160 * 120, .max_keypoints = 100};
-  options.decision.min_score = 5;
-  options.decision.full_steps = 1;
+  options.decision.min_score = 0.2;
   return options;
 }
 

@@ -81,7 +81,7 @@ std::string detection_text(const Detection& d) {
   if (d.earlier_match)
     text += fmt::format(", earlier_match={}", literal(py::cast(*d.earlier_match)));
   if (d.match || d.earlier_match) {
-    text += fmt::format(", score={:.1f}, similarity={:.3f}, inliers={}", d.score, d.similarity,
+    text += fmt::format(", score={:.4f}, similarity={:.3f}, inliers={}", d.score, d.similarity,
                         d.inliers);
   }
   return text + ")";
@@ -115,7 +115,10 @@ void bind_detection(py::module_& module) {
       .def_readonly(
           "earlier_match", &Detection::earlier_match,
           "The best candidate if it is a frame of an earlier session of the map; else None.")
-      .def_readonly("score", &Detection::score, "The value compared with decision.min_score.")
+      .def_readonly(
+          "score", &Detection::score,
+          "The probability that the match is right, 0 to 1; a loop from decision.min_score. "
+          "The number of matches with decision.count_matches.")
       .def_readonly("similarity", &Detection::similarity, "xi of frame and match.")
       .def_readonly("matches", &Detection::matches, "Number of one-to-one feature matches.")
       .def_readonly("inliers", &Detection::inliers,
@@ -139,7 +142,7 @@ void bind_ranked_place(py::module_& module) {
       .def_readonly("matches", &RankedPlace::matches)
       .def_readonly("inliers", &RankedPlace::inliers)
       .def("__repr__", [](const RankedPlace& self) {
-        return fmt::format("RankedPlace({}, score={:.1f}, similarity={:.3f}, inliers={})",
+        return fmt::format("RankedPlace({}, score={:.4f}, similarity={:.3f}, inliers={})",
                            literal(py::cast(self.place)), self.score, self.similarity,
                            self.inliers);
       });

@@ -73,7 +73,7 @@ struct ShownPlace {
 
 void print_row(const std::string& image, std::string_view status, const ShownPlace& shown) {
   const RankedPlace& place = shown.ranked;
-  fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7.1f}  {:>10.3f}  {:>7}{}{}\n", image, status,
+  fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7.4f}  {:>10.3f}  {:>7}{}{}\n", image, status,
              place.place.session, place.place.frame, place.score, place.similarity, place.inliers,
              shown.image.empty() ? "" : "  ", printable(shown.image));
 }

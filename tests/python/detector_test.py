@@ -52,7 +52,7 @@ def test_detection(images):
     loops = [d for d in map(detector.process, images[1:90]) if d.is_loop]
     last = loops[-1]
     assert last.match == pytest.approx(last.frame - 60, abs=4) and last.times.features_ms > 0
-    start = f"Detection(frame={last.frame}, status=loop, match={last.match}, score={last.score:.1f}"
+    start = f"Detection(frame={last.frame}, status=loop, match={last.match}, score={last.score:.4f}"
     assert repr(last).startswith(start)
     assert repr(last.times).startswith("StepTimes(content_ms=")
     assert as_row(detector.query(images[90])) == as_row(detector.query(images[90]))

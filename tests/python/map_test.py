@@ -338,9 +338,9 @@ def test_settings_are_those_of_the_map(made, town, tmp_path):
         loopbit.MapWriter(town, options, "")
     with loopbit.MapWriter(tmp_path / "new.db", options, "") as map:
         assert loopbit.LoopDetector(map=map).options.surf.max_keypoints == 100
-    strict = loopbit.LoopDetectorOptions(decision=loopbit.DecisionOptions(min_score=30))
+    strict = loopbit.LoopDetectorOptions(decision=loopbit.DecisionOptions(min_score=0.75))
     detector = loopbit.LoopDetector(strict, map=loopbit.MapReader(made[0]))
-    assert detector.options.decision.min_score == 30
+    assert detector.options.decision.min_score == 0.75
 
 
 def test_wrong_arguments(made, tmp_path):

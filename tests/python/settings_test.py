@@ -74,7 +74,7 @@ def test_sections_are_references():
 def test_survives_a_pickle_and_json(tmp_path):
     options = loopbit.LoopDetectorOptions()
     loopbit.set_option(options, "surf.upright", False)
-    loopbit.set_option(options, "decision.min_score", 31.5)
+    loopbit.set_option(options, "decision.min_score", 0.875)
     path = tmp_path / "settings.json"
     path.write_text(loopbit.to_json(options))
     for copy in (pickle.loads(pickle.dumps(options)), loopbit.load_options(path)):

@@ -12,7 +12,7 @@ trap 'rm -rf "$scratch"' EXIT
 town=(--world spacing_m=1.5 --world width_px=320 --world height_px=240)
 world=(--frames 150 --world laps=2 "${town[@]}")
 "$loopbit" demo "${world[@]}" --out "$scratch/demo"
-"$loopbit" demo "${world[@]}" --set decision.min_score=60 --out "$scratch/strict"
+"$loopbit" demo "${world[@]}" --set decision.min_score=0.999999 --out "$scratch/strict"
 "$loopbit" demo --frames 75 --world laps=1 "${town[@]}" --map "$scratch/town.db" --out "$scratch/first"
 "$loopbit" demo "${world[@]}" --map "$scratch/town.db" --out "$scratch/second"
 # The second lap is in wider images.

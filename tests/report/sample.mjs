@@ -20,7 +20,7 @@ import {
 } from "./sample_world.mjs";
 
 const kTolerance = 4;
-const kThreshold = 18;
+const kThreshold = 0.98;
 const kMaxSide = 640;
 const kMaxCompared = 2048;
 /** As cameras give it: seconds since 1970. */
@@ -87,20 +87,22 @@ function detect(places, quality, options, next) {
     const match = isAstray ? anywhere : Math.max(0, Math.min(frame - 1, frame - lap + jitter));
     const strength =
       isRevisit && !isAstray ? 12 + 60 * quality * next() ** 1.5 + 8 : 15 * next() ** 2;
-    const score = isAstray && isRevisit && next() < 0.2 ? 19.5 : round(strength, 1);
+    const evidence = isAstray && isRevisit && next() < 0.2 ? 19.5 : round(strength, 1);
+    // A probability, 0.98 for 18.
+    const score = round(1 / (1 + Math.exp((18 - evidence) / 2 - Math.log(49))), 6);
     const isNothing = isUnreadable || isEarly;
     columns.match.push(isNothing ? -1 : match);
     columns.score.push(isNothing ? 0 : score);
-    columns.inliers.push(isNothing ? 0 : Math.floor(score * 1.1));
-    columns.matches.push(isNothing ? 0 : Math.floor(score * 1.4 + 8));
-    const low = score < 4 ? "few_matches" : score < 7 ? "no_geometry" : "low_score";
+    columns.inliers.push(isNothing ? 0 : Math.floor(evidence * 1.1));
+    columns.matches.push(isNothing ? 0 : Math.floor(evidence * 1.4 + 8));
+    const low = evidence < 4 ? "few_matches" : evidence < 7 ? "no_geometry" : "low_score";
     const judged = score >= kThreshold ? "loop" : low;
     columns.status.push(
       statusOf(isUnreadable ? "unreadable" : isEarly ? "no_earlier_place" : judged),
     );
   }
   const close = columns.status.indexOf(statusOf("low_score"));
-  if (close >= 0) columns.score[close] = kThreshold - 0.0004;
+  if (close >= 0) columns.score[close] = kThreshold - 0.00004;
   return columns;
 }
 

@@ -16,8 +16,8 @@ export const share = (value: number | null): string =>
 export const similarity = share;
 
 /**
- * Scores are sums of halves as a rule, but another detector's may be anything: probabilities near 0
- * and near 1 stay told from these.
+ * Scores are probabilities as a rule, and near 0 and near 1 stay told from these: 0.99996 is not
+ * shown as 1. Another detector's may be anything.
  */
 export function score(value: number | null, threshold: number | null = null): string {
   if (value === null) return kMissing;
