@@ -112,10 +112,11 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   flags->truth.add_poses_to(*command);
   CLI::Option* camera =
       command
-          ->add_option("--camera", flags->camera,
-                       "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): measures the "
-                       "relative pose of each loop for relative_poses.csv. Default: the one in a "
-                       "KITTI or EuRoC folder, or camera.yaml in the folder")
+          ->add_option(
+              "--camera", flags->camera,
+              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): measures the "
+              "relative pose of each loop for relative_poses.csv. Default: the one in a "
+              "KITTI or EuRoC folder, or camera.yaml in the folder")
           ->type_name("FILE");
   command->add_flag("--no-poses", flags->no_poses, "Measure no relative poses")->excludes(camera);
   command->footer(list_truth_settings());

@@ -41,13 +41,12 @@ std::string csv_row(const Detection& detection, const RelativePose& pose) {
   const bool is_known = pose.known != PoseKnown::nothing;
   std::string transform = is_known ? to_tum_pose(pose) : std::string(6, ' ');
   std::ranges::replace(transform, ' ', ',');
-  std::string row = fmt::format("{},{},{},{},{},{},{},{}", detection.frame, match_cell(detection),
-                                to_string(pose.status), to_string(pose.known), transform,
-                                pose.matches, pose.inliers.size(),
-                                is_known ? fmt::format("{:.4f}", pose.rms_px) : "");
-  for_each_covariance([&](int i, int j) {
-    row += is_known ? fmt::format(",{:.9g}", pose.covariance(i, j)) : ",";
-  });
+  std::string row =
+      fmt::format("{},{},{},{},{},{},{},{}", detection.frame, match_cell(detection),
+                  to_string(pose.status), to_string(pose.known), transform, pose.matches,
+                  pose.inliers.size(), is_known ? fmt::format("{:.4f}", pose.rms_px) : "");
+  for_each_covariance(
+      [&](int i, int j) { row += is_known ? fmt::format(",{:.9g}", pose.covariance(i, j)) : ","; });
   return row + '\n';
 }
 
@@ -66,8 +65,8 @@ void PoseFile::add(const Detection& detection, const LoopDetector& detector) {
   const Features match = detector.features_of(
       detection.earlier_match.value_or(SessionFrame{0, detection.match.value_or(0)}));
   if (query.working_size_px != match.working_size_px) return;
-  append(csv_row(detection, estimator_.estimate({.query = {&query, &camera_},
-                                                 .match = {&match, &camera_}})));
+  append(csv_row(detection,
+                 estimator_.estimate({.query = {&query, &camera_}, .match = {&match, &camera_}})));
 }
 
 void PoseFile::append(const std::string& row) {

@@ -140,9 +140,8 @@ bool is_unanswered(const std::string& folder) {
 RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_session) {
   std::vector<std::string> inputs = request.other_inputs;
   const ScoringRequest& scoring = request.scoring;
-  inputs.insert(inputs.end(),
-                {input.input(), scoring.truth, scoring.not_false, scoring.ignore, request.poses,
-                 request.camera_file});
+  inputs.insert(inputs.end(), {input.input(), scoring.truth, scoring.not_false, scoring.ignore,
+                               request.poses, request.camera_file});
   if (!request.folder.empty()) return {request.folder, request.overwrite, inputs};
   const auto stem = std::filesystem::path(request.map).replace_extension().string();
   const std::string folder = fmt::format("{}_session_{}", stem, map_session);

@@ -64,12 +64,13 @@ struct RunOutcome {
 ///
 /// Checks the request before it touches anything, as far as possible. The map is opened first and
 /// with `overwrite` a usable frame is read first, so that a refused run does not replace an earlier
-/// one; with a camera, too, to check its size. If the run fails, or the listener throws, run.json says why, the map has the places so far,
-/// and the exception goes on.
+/// one; with a camera, too, to check its size. If the run fails, or the listener throws, run.json
+/// says why, the map has the places so far, and the exception goes on.
 ///
 /// Throws Error: kind option for a request that contradicts itself or the input, or without a
-/// folder and a map; kind input for files of truth and poses, for a camera that does not fit the images, and if the input has ended without a
-/// readable frame; kind output if something cannot be saved; and what MapWriter and run() throw.
+/// folder and a map; kind input for files of truth and poses, for a camera that does not fit the
+/// images, and if the input has ended without a readable frame; kind output if something cannot be
+/// saved; and what MapWriter and run() throw.
 RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
                       const std::atomic<bool>& stop);
 
