@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <pybind11/numpy.h>
@@ -78,9 +79,13 @@ void bind_camera(py::module_& module) {
       .def_readonly("fy", &CameraModel::fy)
       .def_readonly("cx", &CameraModel::cx)
       .def_readonly("cy", &CameraModel::cy)
-      .def_readonly("distortion", &CameraModel::distortion,
-                    "Eight numbers. radial_tangential: k1 k2 p1 p2 k3 k4 k5 k6. equidistant: k1 k2 "
-                    "k3 k4, then 0.")
+      .def_property_readonly(
+          "distortion",
+          [](const CameraModel& self) {
+            return std::vector<double>(self.distortion.begin(), self.distortion.end());
+          },
+          "Eight numbers. radial_tangential: k1 k2 p1 p2 k3 k4 k5 k6. equidistant: k1 k2 k3 k4, "
+          "then 0.")
       .def("__repr__", [](const CameraModel& self) {
         return fmt::format(
             "CameraModel({}, {} x {} px, fx={:.6g}, fy={:.6g}, cx={:.6g}, cy={:.6g})",

@@ -24,7 +24,7 @@ def angle_deg(rotation):
 
 
 def test_cameras(camera, tmp_path):
-    assert (camera.lens, camera.size_px) == ("radial_tangential", (320, 240))
+    assert (camera.lens, camera.size_px) == ("pinhole", (320, 240))
     assert len(camera.distortion) == 8 and camera.fx > 0 and camera.cx == pytest.approx(159.5) and "320 x 240" in repr(camera)
     with pytest.raises(loopbit.InputError, match="missing.yaml"):
         loopbit.read_cameras(tmp_path / "missing.yaml")
