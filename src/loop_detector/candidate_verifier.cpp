@@ -93,7 +93,7 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
 void CandidateVerifier::complete(const Query& query, std::vector<VerifiedCandidate>& verified) {
   for (VerifiedCandidate& v : verified) {
     if (v.geometry) continue;
-    v.geometry = geometry_of(query, v.candidate.place, FirstLook{}, verification_);
+    v.geometry = geometry_of(query, v.candidate.place, FirstLook{}, verification_, true);
   }
 }
 
@@ -119,7 +119,7 @@ void CandidateVerifier::look_closer(Frame& frame, std::size_t first, std::size_t
     return looks_[a].matches.size() > looks_[b].matches.size();
   });
   order.resize(std::min(order.size(), most));
-  for (const std::size_t i : order) verify_in_full(frame, i);
+  for (const std::size_t i : order) verify_in_full(frame, i, false);
 }
 
 /// Verifies those that may have elsewhere what a promising candidate has.
@@ -129,24 +129,30 @@ void CandidateVerifier::look_at_others(Frame& frame) {
     if (v.geometry || !is_elsewhere(frame, v) || !frame.may_share(looks_[i].matches)) continue;
     verifier_.match_some(frame.query.features, frame.features, places_.features(v.candidate.place),
                          verification_);
-    if (verification_.matches.size() >= kMinSharedMatches) verify_in_full(frame, i);
+    if (verification_.matches.size() >= kMinSharedMatches) verify_in_full(frame, i, true);
   }
 }
 
-void CandidateVerifier::verify_in_full(Frame& frame, std::size_t i) {
+void CandidateVerifier::verify_in_full(Frame& frame, std::size_t i, bool even_if_chance) {
   VerifiedCandidate& v = frame.verified[i];
-  v.geometry = geometry_of(frame.query, v.candidate.place, looks_[i], verifications_[i]);
-  if (v.geometry->evidence() > kChanceInliers) {
+  v.geometry =
+      geometry_of(frame.query, v.candidate.place, looks_[i], verifications_[i], even_if_chance);
+  if (v.geometry && v.geometry->evidence() > kChanceInliers) {
     frame.note_promising(spot_of(v), verifications_[i]);
   }
 }
 
-CandidateGeometry CandidateVerifier::geometry_of(const Query& query, PlaceId place,
-                                                 const FirstLook& look, Verification& result) {
+/// None where all matches together would be no more than chance, unless `even_if_chance`.
+std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& query, PlaceId place,
+                                                                const FirstLook& look,
+                                                                Verification& result,
+                                                                bool even_if_chance) {
   const Features& features = places_.features(place);
   verifier_.match(query.features, features, look, result);
   CandidateGeometry geometry{.matches = static_cast<int>(result.matches.size())};
   if (options_.decision.count_matches) return geometry;
+  const double most = geometry.matches * inlier_worth(1.0, query.view_inliers);
+  if (most <= kChanceInliers && !even_if_chance) return std::nullopt;
   verifier_.find_geometry(query.features, features, result);
   geometry.inliers = static_cast<int>(result.inliers.size());
   geometry.distinct_inliers = result.distinct_inliers;

@@ -33,7 +33,7 @@ struct VerifiedCandidate {
   Candidate candidate;
   std::ptrdiff_t step = 0;  ///< the candidate's position along the path, see RecentView::step_of
   int votes = 0;            ///< see displacement_votes()
-  std::optional<CandidateGeometry> geometry = std::nullopt;  ///< if it was looked at closer
+  std::optional<CandidateGeometry> geometry = std::nullopt;  ///< if it may be more than chance
 };
 
 /// What one distinct inlier counts, 0 to 1. `explained_share`: see there. `view_inliers`: distinct
@@ -82,9 +82,10 @@ class CandidateVerifier {
   void look(Frame& frame);
   void look_closer(Frame& frame, std::size_t first, std::size_t last, std::size_t most);
   void look_at_others(Frame& frame);
-  void verify_in_full(Frame& frame, std::size_t i);
-  CandidateGeometry geometry_of(const Query& query, PlaceId place, const FirstLook& look,
-                                Verification& result);
+  void verify_in_full(Frame& frame, std::size_t i, bool even_if_chance);
+  std::optional<CandidateGeometry> geometry_of(const Query& query, PlaceId place,
+                                               const FirstLook& look, Verification& result,
+                                               bool even_if_chance);
   [[nodiscard]] Spot spot_of(const VerifiedCandidate& candidate) const;
   [[nodiscard]] bool is_elsewhere(const Frame& frame, const VerifiedCandidate& candidate) const;
   void find_distinctness(Frame& frame) const;

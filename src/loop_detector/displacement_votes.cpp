@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <tuple>
 
 namespace loopbit {
 namespace {
@@ -30,21 +31,37 @@ std::optional<Bin> bin_of(const Keypoint& a, const Keypoint& b, float bin_px) {
   return is_in(bin.x) && is_in(bin.y) ? std::optional(bin) : std::nullopt;
 }
 
-/// How many displacements fall into each bin, row by row.
-using Displacements = std::array<std::array<int, kBins>, kBins>;
+/// How many displacements fall into each square of four bins, by its upper left bin.
+using Squares = std::array<std::array<int, kBins>, kBins>;
 
-/// The upper left bin of the square of four with most displacements.
-Bin fullest_square(const Displacements& counts) {
+/// Calls visit(x, y) for the squares that have `bin`.
+template <typename Visit>
+void for_each_square(const Bin& bin, const Visit& visit) {
+  for (int y = std::max(0, bin.y - 1); y <= std::min(bin.y, kBins - 2); ++y) {
+    for (int x = std::max(0, bin.x - 1); x <= std::min(bin.x, kBins - 2); ++x) visit(x, y);
+  }
+}
+
+/// The square with most displacements; of equals the first one, row by row.
+Bin fullest_square(const std::vector<std::optional<Bin>>& bins) {
+  Squares counts{};
+  const auto count = [&](int x, int y) -> int& {
+    return counts[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
+  };
   Bin best;
   int most = 0;
-  for (std::size_t y = 0; y + 1 < kBins; ++y) {
-    for (std::size_t x = 0; x + 1 < kBins; ++x) {
-      const int count = counts[y][x] + counts[y][x + 1] + counts[y + 1][x] + counts[y + 1][x + 1];
-      if (count > most) {
-        most = count;
-        best = {static_cast<int>(x), static_cast<int>(y)};
-      }
-    }
+  for (const auto& bin : bins) {
+    if (!bin) continue;
+    for_each_square(*bin, [&](int x, int y) { most = std::max(most, ++count(x, y)); });
+  }
+  bool is_found = false;
+  for (const auto& bin : bins) {
+    if (!bin) continue;
+    for_each_square(*bin, [&](int x, int y) {
+      if (count(x, y) < most || (is_found && std::tie(best.y, best.x) <= std::tie(y, x))) return;
+      best = {x, y};
+      is_found = true;
+    });
   }
   return best;
 }
@@ -81,17 +98,17 @@ int displacement_votes(const Features& query, const Features& place,
     return f.keypoints[static_cast<std::size_t>(i)];
   };
   const float bin_px = static_cast<float>(query.working_size_px.width) / kBinsPerWidth;
-  Displacements counts{};
+  std::vector<std::optional<Bin>> bins;
+  bins.reserve(matches.size());
   for (const Match& match : matches) {
-    const auto bin = bin_of(key(query, match.query), key(place, match.place), bin_px);
-    if (bin) ++counts[static_cast<std::size_t>(bin->y)][static_cast<std::size_t>(bin->x)];
+    bins.push_back(bin_of(key(query, match.query), key(place, match.place), bin_px));
   }
-  const Bin square = fullest_square(counts);
+  const Bin square = fullest_square(bins);
   std::vector<Keypoint> counted;
-  for (const Match& match : matches) {
-    const Keypoint& here = key(query, match.query);
-    const auto bin = bin_of(here, key(place, match.place), bin_px);
-    const auto is_in = [](int i, int first) { return first <= i && i <= first + 1; };
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const Keypoint& here = key(query, matches[i].query);
+    const auto& bin = bins[i];
+    const auto is_in = [](int at, int first) { return first <= at && at <= first + 1; };
     if (!bin || !is_in(bin->x, square.x) || !is_in(bin->y, square.y)) continue;
     const bool is_new = std::none_of(counted.begin(), counted.end(), [&](const Keypoint& other) {
       const auto spacing = min_spacing_scales * std::min(here.scale, other.scale);

@@ -47,7 +47,7 @@ class Stopwatch {
 
 /// Paths worth looking at, even where they do not look alike.
 constexpr std::size_t kFollowedPaths = 3;
-constexpr double kMinFollowedProbability = 1e-4;
+constexpr double kMinFollowedProbability = 2e-3;
 /// On each, the places up to so many steps away.
 constexpr std::ptrdiff_t kFollowedReach = 2;
 /// A frame is compared with all its keypoints if the robot is at an earlier place with this
@@ -184,13 +184,16 @@ class LoopDetector::Impl {
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
     auto candidates = index_.query(seen.content, end, options_.retrieval, nullptr, seen.is_allowed);
-    const std::size_t num_similar = candidates.size();
     PlaceFilter::Belief prior = place_filter_.predict(seen.look.is_step);
+    // Where the robot is sure to be back, half of them are rivals enough.
+    const double revisit = 1 - prior.elsewhere();
+    if (revisit >= options_.decision.min_score) candidates.resize((candidates.size() + 1) / 2);
+    const std::size_t num_similar = candidates.size();
     add_expected(seen, prior, end, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that features, geometry and the frames before agree on.
-    seen.closely = 1 - prior.elsewhere() >= kWorthACloserLook;
+    seen.closely = revisit >= kWorthACloserLook;
     seen.verified = seen.work->candidates.verify(verified_query(seen), candidates, num_similar);
     decide(seen, std::move(prior), num_similar, end, detection);
     detection.times.verification_ms += stopwatch.lap_ms();

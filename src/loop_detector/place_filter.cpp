@@ -52,9 +52,8 @@ constexpr double kShownPrior = 5;
 /// A true place has some ten inliers beyond chance where geometry sees any, which is every second
 /// frame.
 constexpr double kGeometryDensity = 0.5 / 10;
-/// Inliers, votes and the inliers' own spread speak of the same pixels. What they say together
-/// counts less than the product.
-constexpr double kGeometryWeight = 0.7;
+/// Inliers of a wrong place persist half as long along a path as its votes.
+constexpr double kGeometryIndependence = 2;
 /// How rare a thing is can be known no better than by one in so many steps: inliers count fully
 /// once the map has so many, and before in proportion to the logarithm.
 constexpr double kFullSteps = 200;
@@ -63,6 +62,13 @@ constexpr double kFullSteps = 200;
 constexpr double kFullExcess = 4;
 /// No frame can say more.
 constexpr double kMaxLogRatio = 30;
+
+/// To about a billionth: mathematical functions may differ in the last bit between processors, and
+/// answers must not.
+double rounded(double value) {
+  constexpr double kScale = 1 << 30;
+  return std::round(value * kScale) / kScale;
+}
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -108,16 +114,12 @@ void return_to(const std::vector<PlaceFilter::Observed>& observed, std::ptrdiff_
                PlaceFilter::Belief& prior) {
   const double share = kReturn * prior.elsewhere() /
                        (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
-  std::ptrdiff_t last = 0;
-  bool is_first = true;
   std::vector<std::ptrdiff_t> steps;
   steps.reserve(observed.size());
   for (const auto& o : observed) steps.push_back(o.step);
-  std::sort(steps.begin(), steps.end());
+  std::ranges::sort(steps);
+  steps.erase(std::ranges::unique(steps).begin(), steps.end());
   for (const std::ptrdiff_t step : steps) {
-    if (!is_first && step == last) continue;
-    is_first = false;
-    last = step;
     PlaceFilter::Hypothesis& at = hypothesis_at(prior.places, step);
     at.forward += share;
     at.backward += share;
@@ -236,7 +238,7 @@ double PlaceFilter::Belief::at(std::ptrdiff_t step) const {
 }
 
 double PlaceFilter::Observed::log_likelihood_ratio() const {
-  return std::min(kMaxLogRatio, terms.votes + terms.geometry);
+  return rounded(std::min(kMaxLogRatio, terms.votes + terms.geometry));
 }
 
 PlaceFilter::Belief PlaceFilter::predict(bool is_step) const {
@@ -290,13 +292,17 @@ std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>
   return sigmas;
 }
 
-/// Consecutive frames are not independent witnesses: the more alike wrong places look from one step
-/// to the next, the less each counts.
-double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null) const {
+/// Consecutive frames are not independent witnesses: the more alike a wrong place looks from one
+/// step to the next, the less each of them counts.
+double PlaceFilter::independence() const {
   const double correlation = std::clamp(same_path_products_ / same_path_squares_, 0.0, 0.95);
+  return (1 - correlation) / (1 + correlation);
+}
+
+double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null) const {
   const auto degrees = static_cast<double>(std::min(kMaxDegrees, num_null - 1));
   const double ratio = shifted_normal(sigmas, kMeanSigmas) / student_t(sigmas, degrees);
-  return (1 - correlation) / (1 + correlation) * std::log(ratio);
+  return independence() * std::log(ratio);
 }
 
 /// The tail of wrong places is a Lomax distribution: an exponential one whose mean is only as well
@@ -311,7 +317,7 @@ double PlaceFilter::geometry_log_ratio(double evidence, std::ptrdiff_t num_steps
   const double at_beginning =
       std::log(steps * kGeometryDensity * tail_.excess / (rate * tail_.count));
   const double growth = (tail_.count + 1) * std::log1p(excess / tail_.excess);
-  return kGeometryWeight *
+  return std::min(1.0, kGeometryIndependence * independence()) *
          std::max(0.0, growth + std::min(1.0, excess / kFullExcess) * at_beginning);
 }
 
@@ -363,6 +369,8 @@ PlaceFilter::Update PlaceFilter::update(
                 [](const Hypothesis& h) { return h.probability() < kMinProbability; });
   update.prior = std::move(prior);
   choose_match(num_steps, loops, update);
+  update.probability = rounded(update.probability);
+  update.revisit = rounded(update.revisit);
   return update;
 }
 

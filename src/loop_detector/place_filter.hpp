@@ -137,6 +137,7 @@ class PlaceFilter {
   [[nodiscard]] std::vector<double> deviations(const std::vector<VerifiedCandidate>& verified,
                                                std::size_t num_similar) const;
   [[nodiscard]] double mean_shown(std::ptrdiff_t step) const;
+  [[nodiscard]] double independence() const;
   [[nodiscard]] double votes_log_ratio(double sigmas, std::size_t num_null) const;
   [[nodiscard]] double geometry_log_ratio(double evidence, std::ptrdiff_t num_steps) const;
   void learn(const Update& update, const KnownLoops& loops, Next& next) const;
