@@ -50,7 +50,7 @@ set(CPACK_DEBIAN_POSES_DESCRIPTION "${summary}: relative poses
 set(CPACK_DEBIAN_DATA_PACKAGE_NAME libloopbit-data${abi})
 set(CPACK_DEBIAN_DATA_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}")
 set(CPACK_DEBIAN_DATA_DESCRIPTION "${summary}: data sets, scores, reports
  Reads ground truth, scores loops, and writes reports.")
 
