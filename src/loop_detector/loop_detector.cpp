@@ -464,7 +464,7 @@ class LoopDetector::Impl {
     return step < 0 ? memory_.place_of(step) : recent_view_.place_of(step);
   }
 
-  [[nodiscard]] bool is_candidate(PlaceId place, PlaceId end, const Observation& seen) const {
+  static bool is_candidate(PlaceId place, PlaceId end, const Observation& seen) {
     return place < end && (!seen.is_allowed || seen.is_allowed(place));
   }
 
@@ -524,8 +524,8 @@ class LoopDetector::Impl {
                            : reason_of_rejection(*seen.best->geometry, options_.verification);
   }
 
-  void report_match(VerifiedCandidate best, Observation& seen, Detection& detection) const {
-    std::vector<VerifiedCandidate> match{std::move(best)};
+  void report_match(const VerifiedCandidate& best, Observation& seen, Detection& detection) const {
+    std::vector<VerifiedCandidate> match{best};
     seen.work->candidates.complete(verified_query(seen), match);
     seen.best = match.front();
     const PlaceId place = seen.best->candidate.place;

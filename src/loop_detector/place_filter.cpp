@@ -118,7 +118,7 @@ void return_to(const std::vector<PlaceFilter::Observed>& observed, std::ptrdiff_
   steps.reserve(observed.size());
   for (const auto& o : observed) steps.push_back(o.step);
   std::ranges::sort(steps);
-  steps.erase(std::ranges::unique(steps).begin(), steps.end());
+  steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
   for (const std::ptrdiff_t step : steps) {
     PlaceFilter::Hypothesis& at = hypothesis_at(prior.places, step);
     at.forward += share;
