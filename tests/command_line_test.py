@@ -4,8 +4,10 @@
 """The loopbit command as a user meets it: what it writes, says and exits with."""
 
 import contextlib
+import csv
 import fcntl
 import json
+import math
 import os
 import pathlib
 import pty
@@ -14,6 +16,7 @@ import resource
 import shutil
 import signal
 import sqlite3
+import statistics
 import struct
 import subprocess
 import tempfile
@@ -31,7 +34,111 @@ HEADER = (
 )
 
 
+def pose_rows(folder):
+    with open(folder / "relative_poses.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def rotation_error_deg(row, truth):
+    """Angle between the rotation of a row and that of `truth`, camera-to-world rows of 3 x 4."""
+    match, query = truth[int(row["match"])], truth[int(row["query"])]
+    true = [[sum(match[4 * k + i] * query[4 * k + j] for k in range(3)) for j in range(3)]
+            for i in range(3)]
+    x, y, z, w = (float(row[name]) for name in ("qx", "qy", "qz", "qw"))
+    found = [[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+             [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]]
+    trace = sum(true[i][j] * found[i][j] for i in range(3) for j in range(3))
+    return math.degrees(math.acos(max(-1.0, min(1.0, (trace - 1) / 2))))
+
+
 class CommandLineTest(CommandTest):
+    # Relative poses.
+
+    def camera_for(self, width_px):
+        """A calibration that differs from that of the world in the width of its images."""
+        camera = self.scratch / "camera.yaml"
+        text = (self.dataset / "camera.yaml").read_text()
+        camera.write_text(re.sub("image_width: 320", f"image_width: {width_px}", text))
+        return camera
+
+    def test_a_camera_gives_each_loop_a_row(self):
+        camera = self.dataset / "camera.yaml"
+        ran = loopbit("run", self.images, "--out", self.out, "--camera", camera, "--no-report")
+        self.assertEqual((ran.returncode, complaints(ran)), (0, []))
+        self.assertIn(f"{self.out}/relative_poses.csv, with {camera}", ran.stdout)
+        self.assertEqual(decisions(self.out), decisions(self.reference))
+        loops = [(row["frame"], row["match"]) for row in rows(self.out) if row["status"] == "loop"]
+        poses = pose_rows(self.out)
+        self.assertEqual([(row["query"], row["match"]) for row in poses], loops)
+        for row in poses:
+            self.assertEqual(len(row), 14 + 21)
+            is_known = row["known"] != "nothing"
+            for name in ("x", "qw", "rms_px", "cov_x_x", "cov_rz_rz"):
+                self.assertEqual(row[name] != "", is_known, row)
+        record = json.loads((self.out / "run.json").read_text())
+        self.assertEqual(record["camera"], str(camera))
+
+    @unittest.skipIf(QUICK, "too few frames")
+    def test_relative_poses_have_the_rotations_of_the_truth(self):
+        ran = loopbit("run", self.images, "--out", self.out, "--no-report",
+                      "--camera", self.dataset / "camera.yaml")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        truth = [[float(number) for number in line.split()]
+                 for line in (self.dataset / "poses.txt").read_text().splitlines()]
+        errors_deg = [rotation_error_deg(row, truth) for row in pose_rows(self.out)
+                      if row["known"] != "nothing"]
+        self.assertGreater(len(errors_deg), 20)
+        self.assertLess(statistics.median(errors_deg), 0.5)
+        self.assertLess(statistics.quantiles(errors_deg, n=10)[-1], 1.5)
+
+    def test_a_map_has_the_features_for_poses_of_earlier_sessions(self):
+        for session in (1, 2):
+            ran = loopbit("run", self.images, "--out", self.scratch / str(session), "--limit", 10,
+                          "--map", self.scratch / "town.db", "--no-report",
+                          "--camera", self.dataset / "camera.yaml")
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+        poses = pose_rows(self.scratch / "2")
+        self.assertGreater(len(poses), 0)
+        for row in poses:
+            self.assertRegex(row["match"], r"^1:\d+$")
+
+    def test_a_camera_that_does_not_fit_is_refused(self):
+        camera = self.camera_for(width_px=640)
+        ran = loopbit("run", self.few_images(), "--out", self.out, "--camera", camera)
+        self.assert_fails(ran, 3, f"'{camera}' is for images of 640 x 240 px", "320 x 240")
+        self.assertFalse(self.out.exists())
+
+    def test_a_camera_that_cannot_be_read_is_refused(self):
+        missing = self.scratch / "missing.yaml"
+        malformed = self.scratch / "malformed.yaml"
+        malformed.write_text("image_width: 320\n")
+        for camera in (missing, malformed):
+            with self.subTest(camera.name):
+                ran = loopbit("run", self.images, "--out", self.out, "--camera", camera)
+                self.assert_fails(ran, 3, camera)
+        self.assertFalse(self.out.exists())
+
+    def test_a_calibration_in_the_folder_is_found(self):
+        images = self.few_images(3)
+        run = ["run", images, "--out", self.out, "--no-report", "--overwrite"]
+        shutil.copy(self.dataset / "camera.yaml", images)
+        ran = loopbit(*run)
+        self.assertEqual((ran.returncode, complaints(ran)), (0, []))
+        self.assertIn(f"with {images / 'camera.yaml'}", ran.stdout)
+        ran = loopbit(*run, "--no-poses")
+        self.assertEqual((ran.returncode, complaints(ran)), (0, []))
+        self.assertFalse((self.out / "relative_poses.csv").exists())
+
+    def test_a_found_calibration_that_does_not_fit_is_told_and_left_out(self):
+        images = self.few_images(3)
+        shutil.copy(self.camera_for(width_px=640), images)
+        ran = loopbit("run", images, "--out", self.out, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn("loopbit: No relative poses: ", ran.stderr)
+        self.assertEqual(len(rows(self.out)), 3)
+        self.assertFalse((self.out / "relative_poses.csv").exists())
+
     # What a run leaves.
 
     def test_loops_csv_has_the_documented_header_and_a_row_a_frame(self):

@@ -3,8 +3,10 @@
 #include "loopbit/record_run.hpp"
 
 #include <atomic>
+#include <filesystem>
 #include <memory>
 #include <stdexcept>
+#include <string>
 
 #include "loopbit/finished_run.hpp"
 
@@ -63,6 +65,22 @@ class RecordRunTest : public test::ScratchTest {
   RunRequest request_;
   RunListener listener_{[](const Detection&) {}, [](const std::string&) {}};
 };
+
+TEST_F(RecordRunTest, ACameraThatDoesNotFitBeginsNoSession) {
+  in_map();
+  request_.camera = CameraModel{.size_px = {64, 48}, .fx = 50, .fy = 50, .cx = 32, .cy = 24};
+  request_.camera_file = "left.yaml";
+  try {
+    run(ThreeViews());
+    FAIL() << "the camera was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::input);
+    EXPECT_NE(std::string(error.what()).find("'left.yaml' is for images of 64 x 48 px"),
+              std::string::npos)
+        << error.what();
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("town.db")));
+}
 
 TEST_F(RecordRunTest, ARunThatIsCutOffTellsWhatItRead) {
   listener_.on_detection = [&](const Detection&) {

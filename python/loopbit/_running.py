@@ -113,6 +113,7 @@ def run_folder(
     not_false: Path | None = None,
     ignore: Path | None = None,
     positions_m: numpy.typing.ArrayLike | Path | None = None,
+    camera: Path | None = None,
     keep_images: bool = False,
     map_cache_mb: int | None = None,
     overwrite: bool = False,
@@ -134,6 +135,8 @@ def run_folder(
     evaluate().
     positions_m: camera centres, one per frame read, nan if unknown; or a file of poses. A truth
     file of poses also provides them.
+    camera: a calibration file, see read_cameras(), whose first camera is that of the images. The run
+    then measures the relative pose of each loop and writes relative_poses.csv.
     Files count all frames of the sequence, whatever part of it is read.
 
     Arguments are checked before the first frame as far as possible. If truth or positions turn out
@@ -159,6 +162,7 @@ def run_folder(
         truth=known,
         poses=file,
         positions_m=rows,
+        camera=camera or "",
     ), on_bad_frame)
 
 

@@ -254,6 +254,12 @@ void SharedDetector::reject(const QueryArgument& query, const std::optional<Plac
   detector_.reject(frame, wrong);
 }
 
+Features SharedDetector::features_of(const PlaceArgument& place) const {
+  const SessionFrame wanted = to_place(place, "place");
+  const Answering guard(mutex_, is_answering_);
+  return detector_.features_of(wanted);
+}
+
 PlaceId SharedDetector::size() const {
   const FreeAndLocked guard(mutex_);
   return detector_.size();
@@ -306,6 +312,9 @@ void bind_detector(py::module_& module) {
            "frames that show the same view do not match there again. The map records the pair as "
            "rejected. query is a Detection, whose match is rejected, or a frame with its match. An "
            "int is a frame of this session.")
+      .def("features_of", &SharedDetector::features_of, py::arg("place"),
+           "A copy of the features of a place, such as for relative_pose(). Empty for a frame that "
+           "was unreadable or removed. An int is a frame of this session.")
       .def("__len__", &SharedDetector::size)
       .def_property_readonly("options", &SharedDetector::options, "A copy of the settings.")
       .def("__repr__", [](const SharedDetector& self) {

@@ -33,6 +33,7 @@ class SharedDetector {
   Detection skip(std::optional<double> timestamp_s);
   void remove(const PlaceArgument& place);
   void reject(const QueryArgument& query, const std::optional<PlaceArgument>& match);
+  [[nodiscard]] Features features_of(const PlaceArgument& place) const;
   [[nodiscard]] PlaceId size() const;
   [[nodiscard]] LoopDetectorOptions options() const;
 

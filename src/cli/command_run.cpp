@@ -8,9 +8,12 @@
 
 #include <fmt/format.h>
 
+#include "loopbit/camera_file.hpp"
+#include "loopbit/error.hpp"
 #include "loopbit/recordings.hpp"
 
 #include "commands.hpp"
+#include "process.hpp"
 #include "session.hpp"
 #include "truth_flags.hpp"
 
@@ -26,6 +29,8 @@ struct RunFlags {
   Sampling sampling;
   int max_megapixels = kMaxMegapixels;
   TruthFlags truth;
+  std::string camera;
+  bool no_poses = false;
 };
 
 /// "images_loops" in the working folder for a folder "images" anywhere; with a new number if that
@@ -43,12 +48,35 @@ std::string usual_folder(const RunFlags& flags) {
   return folder;
 }
 
+/// The calibration of --camera, or the one in the data set's folder. Throws Error only for the
+/// former.
+void choose_camera(const RunFlags& flags, SessionFlags& session) {
+  if (flags.no_poses) return;
+  RunRequest& run = session.run;
+  if (!flags.camera.empty()) {
+    run.camera = read_camera(flags.camera);
+    run.camera_file = flags.camera;
+    return;
+  }
+  const auto found = find_camera(flags.input);
+  if (!found) return;
+  try {
+    run.camera = read_camera(found->path, found->index);
+  } catch (const Error& error) {
+    tell(fmt::format("loopbit: No relative poses: {}\n", error.what()));
+    return;
+  }
+  run.camera_file = found->path;
+  session.found_camera = true;
+}
+
 int run_command(RunFlags& flags, const Arguments& arguments) {
   RunRequest& run = flags.session.run;
   if (run.folder.empty() && run.map.empty()) run.folder = usual_folder(flags);
   run.arguments = arguments;
   run.scoring = flags.truth.scoring;
   run.poses = flags.truth.poses;
+  choose_camera(flags, flags.session);
   return run_session(
       subsample(open_input(flags.input, flags.topic, flags.max_megapixels), flags.sampling),
       flags.input, flags.sampling, flags.session);
@@ -82,6 +110,15 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   add_topic_flag(*command, flags->topic);
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
+  CLI::Option* camera =
+      command
+          ->add_option(
+              "--camera", flags->camera,
+              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): measures the "
+              "relative pose of each loop for relative_poses.csv. Default: the one in a "
+              "KITTI or EuRoC folder, or camera.yaml in the folder")
+          ->type_name("FILE");
+  command->add_flag("--no-poses", flags->no_poses, "Measure no relative poses")->excludes(camera);
   command->footer(list_truth_settings());
   command->callback(
       [flags, &arguments, &exit_code] { exit_code = run_command(*flags, arguments); });

@@ -43,6 +43,17 @@ RunOutcome run_with_progress(RunInput& input, const SessionFlags& flags,
                     stop);
 }
 
+/// Leaves out a camera that was found and is not the one of `frames`, and says so.
+void drop_other_camera(RunRequest& request, RunInput& frames) {
+  const cv::Size size_px = frames.prove().image.size();
+  try {
+    check_size(*request.camera, fmt::format("'{}'", request.camera_file), size_px);
+  } catch (const Error& error) {
+    tell(fmt::format("loopbit: No relative poses: {}\n", error.what()));
+    request.camera.reset();
+  }
+}
+
 }  // namespace
 
 void SessionFlags::add_to(CLI::App& command) {
@@ -132,6 +143,7 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   cv::setNumThreads(request.threads);
   if (request.threads > 1) source = prefetch(std::move(source), kFramesReadAhead);
   RunInput frames(std::move(source), input, sampling);
+  if (flags.found_camera) drop_other_camera(request, frames);
   const RunOutcome outcome = run_with_progress(frames, flags, stop);
   if (!outcome.record.early_end.empty()) {
     tell(fmt::format("loopbit: {}\n", outcome.record.early_end));

@@ -26,6 +26,7 @@ struct SessionFlags {
   bool json = false;                  ///< JSON in place of the summary
   bool quiet = false;                 ///< no progress, no summary
   ReportOptions report;
+  bool found_camera = false;  ///< run.camera was not named by the user; it may be of other images
 
   void add_to(CLI::App& command);
 

@@ -93,6 +93,10 @@ void print_summary(const RunOutcome& run, const std::string& report) {
   if (record.score) print_score(record.score->decision);
   print_times(record, detections);
   fmt::print("written    {0}/loops.csv, {0}/run.json\n", printable(run.folder));
+  if (!record.camera.empty()) {
+    fmt::print("poses      {}/relative_poses.csv, with {}\n", printable(run.folder),
+               printable(record.camera));
+  }
   if (!record.map_path.empty()) {
     fmt::print("map        {}, session {}\n", printable(record.map_path), record.map_session);
   }

@@ -290,6 +290,15 @@ class LoopDetector::Impl {
     if (step_of(index_.size() - 1) == step_of(*place)) filter_.reject(*wrong);
   }
 
+  /// See LoopDetector::features_of.
+  [[nodiscard]] Features features_of(const SessionFrame& at) const {
+    const auto place = find(at);
+    if (!place) throw missing(at);
+    if (filter_.is_removed(*place)) return {};
+    PlaceMemory::Held held;
+    return memory_.features(*place, held);
+  }
+
   /// Frames of this session.
   [[nodiscard]] PlaceId size() const { return index_.size() - memory_.session_begin(); }
   [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
@@ -593,6 +602,10 @@ void LoopDetector::reject(const Detection& loop) {
                 fmt::format("Frame {} has no match that could be rejected.", loop.frame));
   }
   reject({0, loop.frame}, loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}));
+}
+
+Features LoopDetector::features_of(const SessionFrame& place) const {
+  return impl_->features_of(place);
 }
 
 PlaceId LoopDetector::size() const { return impl_->size(); }

@@ -15,6 +15,7 @@
 #include "loopbit/picture_jpeg.hpp"
 
 #include "evidence_writer.hpp"
+#include "pose_file.hpp"
 #include "run_files.hpp"
 #include "run_folder.hpp"
 
@@ -95,7 +96,19 @@ RunRecord record_of(const RunInput& input, const RunRequest& request) {
           .map_path = request.map,
           .stopped_by = kRunning,
           .arguments = request.arguments,
+          .camera = request.camera ? request.camera_file : "",
           .truth = truth.empty() ? request.truth_description : truth};
+}
+
+/// With the size of the images if the calibration has none. Throws Error (kind input) if it does
+/// not fit the first usable image.
+std::optional<CameraModel> camera_of(RunInput& input, const RunRequest& request) {
+  std::optional<CameraModel> camera = request.camera;
+  if (!camera) return std::nullopt;
+  const cv::Size size_px = input.prove().image.size();
+  check_size(*camera, fmt::format("'{}'", request.camera_file), size_px);
+  camera->size_px = size_px;
+  return camera;
 }
 
 /// Null without a map.
@@ -127,8 +140,8 @@ bool is_unanswered(const std::string& folder) {
 RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_session) {
   std::vector<std::string> inputs = request.other_inputs;
   const ScoringRequest& scoring = request.scoring;
-  inputs.insert(inputs.end(),
-                {input.input(), scoring.truth, scoring.not_false, scoring.ignore, request.poses});
+  inputs.insert(inputs.end(), {input.input(), scoring.truth, scoring.not_false, scoring.ignore,
+                               request.poses, request.camera_file});
   if (!request.folder.empty()) return {request.folder, request.overwrite, inputs};
   const auto stem = std::filesystem::path(request.map).replace_extension().string();
   const std::string folder = fmt::format("{}_session_{}", stem, map_session);
@@ -138,9 +151,11 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
 /// A run, from its folder to its end.
 class RecordedRun {
  public:
-  RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected)
+  RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected,
+              const std::optional<CameraModel>& camera)
       : input_(input),
         request_(request),
+        camera_(camera),
         frames_(std::move(expected)),
         map_(open_map(input, request)),
         detector_(std::in_place, request.options, map_),
@@ -155,9 +170,12 @@ class RecordedRun {
     const WallClock clock(record_.wall_s);
     const std::shared_ptr<MapWriter> map = std::move(map_);
     LoopDetector detector = std::move(*detector_);
+    std::optional<PoseFile> poses;
+    if (camera_) poses.emplace(folder_.path(), *camera_);
     RunListener recording{.on_detection =
                               [&](const Detection& detection) {
                                 folder_.add(detection);
+                                if (poses) poses->add(detection, detector);
                                 listener.on_detection(detection);
                               },
                           .on_bad_frame = listener.on_bad_frame};
@@ -232,6 +250,7 @@ class RecordedRun {
 
   RunInput& input_;
   const RunRequest& request_;
+  std::optional<CameraModel> camera_;
   FramesRead frames_;               ///< expected, then read
   std::shared_ptr<MapWriter> map_;  ///< null without one, and after detect()
   std::optional<LoopDetector> detector_;
@@ -250,7 +269,7 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
   if (request.overwrite || request.options.exclusion.seconds > 0) {
     check_time(input.prove(), request.options);
   }
-  RecordedRun run(input, request, expected);
+  RecordedRun run(input, request, expected, camera_of(input, request));
   try {
     run.detect(listener, stop);
   } catch (const std::exception& error) {

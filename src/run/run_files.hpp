@@ -21,6 +21,7 @@ inline constexpr const char* kNotFalseFile = "not_false.csv";
 inline constexpr const char* kIgnoreFile = "ignore.csv";
 inline constexpr const char* kUnknownFile = "unknown.csv";
 inline constexpr const char* kPositionsFile = "positions.csv";
+inline constexpr const char* kPosesFile = "relative_poses.csv";
 inline constexpr const char* kReportFile = "report.html";
 
 /// The folder in a run folder for the run that is being replaced.
@@ -30,6 +31,9 @@ inline bool is_there(const std::filesystem::path& file) {
   std::error_code error;
   return std::filesystem::exists(file, error);
 }
+
+/// "17", or "2:17" for frame 17 of session 2 of the map; empty without a match.
+std::string match_cell(const Detection& detection);
 
 /// The text of run.json.
 std::string to_json(const RunRecord& record);

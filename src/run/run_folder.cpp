@@ -26,14 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// "17", or "2:17" for frame 17 of session 2 of the map.
-std::string match_cell(const Detection& d) {
-  if (d.earlier_match) {
-    return fmt::format("{}:{}", d.earlier_match->session, d.earlier_match->frame);
-  }
-  return d.match ? fmt::format("{}", *d.match) : "";
-}
-
 /// A name that needs no quotes: commas, quotes and control characters become "\x2c" and the like.
 std::string name_cell(const std::string& name) {
   std::string cell;
@@ -121,6 +113,13 @@ RunResults run_results(const std::vector<Detection>& detections, double wall_s) 
 }
 
 }  // namespace
+
+std::string match_cell(const Detection& detection) {
+  if (detection.earlier_match) {
+    return fmt::format("{}:{}", detection.earlier_match->session, detection.earlier_match->frame);
+  }
+  return detection.match ? fmt::format("{}", *detection.match) : "";
+}
 
 RunFolder::RunFolder(const std::string& path, bool overwrite,
                      const std::vector<std::string>& inputs)

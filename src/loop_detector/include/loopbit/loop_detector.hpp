@@ -101,6 +101,11 @@ class LoopDetector {
   /// Rejects the match of `loop`, a detection of this detector.
   void reject(const Detection& loop);
 
+  /// The features that verification compares, such as for the relative pose of a loop. Empty for a
+  /// frame that was unreadable or removed. Session 0 is this session. Throws Error (kind option) if
+  /// there is no such frame, and whatever MapStorage::features throws. Copies up to 50 KB.
+  [[nodiscard]] Features features_of(const SessionFrame& place) const;
+
   /// Number of frames in this session so far.
   [[nodiscard]] PlaceId size() const;
 

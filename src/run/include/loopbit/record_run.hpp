@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "loopbit/camera.hpp"
 #include "loopbit/detection.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/ground_truth.hpp"
@@ -40,7 +41,10 @@ struct RunRequest {
   std::string truth_description = {};  ///< of `truth`, for people
   std::string poses = {};              ///< a file; empty = the file of truth, if that has poses
   std::optional<Positions> positions_m = std::nullopt;  ///< one per frame, in place of `poses`
-  std::vector<std::string> other_inputs = {};           ///< more files that are never replaced
+  /// The camera of the images, to measure the relative pose of each loop.
+  std::optional<CameraModel> camera = std::nullopt;
+  std::string camera_file = {};                ///< where it is from, for messages and run.json
+  std::vector<std::string> other_inputs = {};  ///< more files that are never replaced
 };
 
 /// What came of a run.
@@ -60,12 +64,13 @@ struct RunOutcome {
 ///
 /// Checks the request before it touches anything, as far as possible. The map is opened first and
 /// with `overwrite` a usable frame is read first, so that a refused run does not replace an earlier
-/// one. If the run fails, or the listener throws, run.json says why, the map has the places so far,
-/// and the exception goes on.
+/// one; with a camera, too, to check its size. If the run fails, or the listener throws, run.json
+/// says why, the map has the places so far, and the exception goes on.
 ///
 /// Throws Error: kind option for a request that contradicts itself or the input, or without a
-/// folder and a map; kind input for files of truth and poses and if the input has ended without a
-/// readable frame; kind output if something cannot be saved; and what MapWriter and run() throw.
+/// folder and a map; kind input for files of truth and poses, for a camera that does not fit the
+/// images, and if the input has ended without a readable frame; kind output if something cannot be
+/// saved; and what MapWriter and run() throw.
 RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
                       const std::atomic<bool>& stop);
 

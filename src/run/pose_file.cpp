@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "pose_file.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <filesystem>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "loopbit/write_file.hpp"
+
+#include "run_files.hpp"
+
+namespace loopbit {
+namespace {
+
+constexpr std::array<std::string_view, 6> kAxes{"x", "y", "z", "rx", "ry", "rz"};
+
+/// Calls visit(row, column) with each place of the upper triangle of the covariance, row by row.
+template <typename Visit>
+void for_each_covariance(const Visit& visit) {
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column) visit(row, column);
+  }
+}
+
+std::string header() {
+  std::string text = "query,match,status,known,x,y,z,qx,qy,qz,qw,matches,inliers,rms_px";
+  for_each_covariance([&](int row, int column) {
+    text += fmt::format(",cov_{}_{}", kAxes[static_cast<std::size_t>(row)],
+                        kAxes[static_cast<std::size_t>(column)]);
+  });
+  return text + '\n';
+}
+
+/// Cells of what is not known are empty.
+std::string csv_row(const Detection& detection, const RelativePose& pose) {
+  const bool is_known = pose.known != PoseKnown::nothing;
+  std::string transform = is_known ? to_tum_pose(pose) : std::string(6, ' ');
+  std::ranges::replace(transform, ' ', ',');
+  std::string row =
+      fmt::format("{},{},{},{},{},{},{},{}", detection.frame, match_cell(detection),
+                  to_string(pose.status), to_string(pose.known), transform, pose.matches,
+                  pose.inliers.size(), is_known ? fmt::format("{:.4f}", pose.rms_px) : "");
+  for_each_covariance(
+      [&](int i, int j) { row += is_known ? fmt::format(",{:.9g}", pose.covariance(i, j)) : ","; });
+  return row + '\n';
+}
+
+}  // namespace
+
+PoseFile::PoseFile(const std::string& folder, const CameraModel& camera)
+    : path_((std::filesystem::path(folder) / kPosesFile).string()), camera_(camera) {
+  errno = 0;
+  stream_.open(path_, std::ios::binary);
+  append(header());
+}
+
+void PoseFile::add(const Detection& detection, const LoopDetector& detector) {
+  if (detection.status != Status::loop) return;
+  const Features query = detector.features_of({0, detection.frame});
+  const Features match = detector.features_of(
+      detection.earlier_match.value_or(SessionFrame{0, detection.match.value_or(0)}));
+  if (query.working_size_px != match.working_size_px) return;
+  append(csv_row(detection,
+                 estimator_.estimate({.query = {&query, &camera_}, .match = {&match, &camera_}})));
+}
+
+void PoseFile::append(const std::string& row) {
+  stream_ << row << std::flush;
+  if (!stream_) throw cannot_write(path_, errno);
+}
+
+}  // namespace loopbit
