@@ -22,6 +22,9 @@ REAL = {
                     None),
     "euroc_room": ("euroc_room/images", "euroc_room/truth.csv", "euroc_room/not_false.csv", None),
     "lateral_corridor": ("lateral_corridor/images", "lateral_corridor/truth.csv", None, None),
+    **{f"gardens_point {name.replace('_', ' ')}": (
+        f"gardens_point/{name}.txt", "gardens_point/truth.csv", "gardens_point/not_false.csv", None)
+       for name in ("left_then_right", "right_then_night", "left_then_night")},
 }
 WORLDS = {
     "world 1": {"seed": 1},

@@ -83,7 +83,7 @@ inline constexpr std::array<std::string_view, 2> kPresets{"default", "paper"};
 
 /// `default`: LoopDetectorOptions{}. `paper`: the pipeline of Wang et al. 2019 as published, to
 /// compare with: every earlier place beyond a fixed xi and with a near enough centre M is matched
-/// with rotated SURF, and their number decides, without geometry or agreement. The paper names no
+/// with rotated SURF, and their number decides, without geometry or frames before. The paper names no
 /// values; those here are ours. Throws Error (kind option) for other names.
 LoopDetectorOptions preset(std::string_view name);
 

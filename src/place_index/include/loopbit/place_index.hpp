@@ -45,8 +45,7 @@ struct RetrievalOptions {
         Field{"shift_tolerance_columns", &S::shift_tolerance_columns, 0, 32,
               "contents are compared at shifts of up to this many of 64 columns, in steps of 2"},
         Field{"min_spacing", &S::min_spacing, 1, 1000,
-              "smallest distance between candidates, in places; also the range of places examined "
-              "around a followed way or the best candidate"},
+              "smallest distance between candidates, in places"},
         Field{"max_center_distance_px", &S::max_center_distance_px, 0.0, kMaxCenterDistance_px,
               "largest distance between the centres M of candidate and query, px; 90 = no limit"}};
   }
