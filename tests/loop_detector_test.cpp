@@ -186,10 +186,13 @@ TEST(LoopDetector, FramesThatMatchedElsewhereDoNotSupportALoop) {
 
 TEST(LoopDetector, StandingStillAddsNoEvidence) {
   LoopDetector detector = after_places(0, kLap - 1, fast_options());
-  const Detection first = detector.process(again(3));
-  ASSERT_EQ(first.status, Status::loop);
+  // While it stands here, all places of the lap become candidates.
+  for (int i = 0; i < 16; ++i) detector.process(view(50));
+  ASSERT_EQ(detector.process(half_covered(3)).match, 3);
+  const Detection first = detector.process(half_covered(3));
+  EXPECT_LT(first.score, 0.9999) << "or there is nothing to add to";
   for (int i = 0; i < 3; ++i) {
-    const Detection next = detector.process(again(3));
+    const Detection next = detector.process(half_covered(3));
     EXPECT_EQ(next.match, first.match);
     EXPECT_EQ(next.score, first.score);
   }
@@ -197,13 +200,13 @@ TEST(LoopDetector, StandingStillAddsNoEvidence) {
 
 TEST(LoopDetector, MinScoreItselfIsEnough) {
   LoopDetectorOptions options = short_window_options();
-  const Detection loop = after_places(1, 2, options).query(again(1));
+  const Detection loop = after_places(1, 12, options).query(again(1));
   ASSERT_EQ(loop.status, Status::loop);
   options.decision.min_score = loop.score;
-  expect_same_answer(after_places(1, 2, options).query(again(1)), loop);
+  expect_same_answer(after_places(1, 12, options).query(again(1)), loop);
 
   options.decision.min_score = std::nextafter(loop.score, 2.0);
-  const Detection rejected = after_places(1, 2, options).query(again(1));
+  const Detection rejected = after_places(1, 12, options).query(again(1));
   EXPECT_EQ(rejected.status, Status::low_score);
   EXPECT_EQ(rejected.match, loop.match);
   EXPECT_EQ(rejected.score, loop.score);
@@ -270,23 +273,6 @@ TEST(LoopDetector, SkippedFramesSayNothingOfThePlacesBesideThem) {
   }
 }
 
-TEST(LoopDetector, OfPlacesThatWouldDoTheOneThatShowsMostIsTheLoop) {
-  LoopDetectorOptions options = short_window_options();
-  LoopDetector detector = after_places(0, 19, options);
-  for (int place = 2; place < 6; ++place) detector.process(again(place));
-  // The robot came along the places before 6, but most of what it sees now is place 15.
-  cv::Mat1b image = again(15);
-  again(6)(cv::Rect(0, 0, 130, 240)).copyTo(image(cv::Rect(0, 0, 130, 240)));
-  std::vector<RankedPlace> ranking;
-  const Detection detection = detector.query(image, std::nullopt, &ranking);
-  EXPECT_EQ(detection.status, Status::loop);
-  EXPECT_EQ(detection.match, 15);
-  ASSERT_GT(ranking.size(), 1U);
-  EXPECT_EQ(ranking[0].place, (SessionFrame{0, 15}));
-  EXPECT_EQ(ranking[1].place, (SessionFrame{0, 6}));
-  EXPECT_GT(ranking[1].score, ranking[0].score);
-}
-
 /// Loops of a second lap of which only the first frame looks exactly as it did.
 int loops_after_one_that_looks_alike(const LoopDetectorOptions& options) {
   LoopDetector detector = after_places(0, 20, options);
@@ -346,15 +332,6 @@ TEST(LoopDetector, EvidenceCountsLessWhileTheMapIsSmall) {
     return after_places(1, places, short_window_options()).query(half_covered(1)).score;
   };
   EXPECT_LT(score_in_a_map_of(4), score_in_a_map_of(7));
-}
-
-TEST(LoopDetector, EvidenceCountsLessWhereTheViewSharesMuchWithTheStepBefore) {
-  const auto score_after = [](const cv::Mat1b& step_before) {
-    LoopDetector detector = after_places(1, 20, short_window_options());
-    detector.process(step_before);
-    return detector.query(half_covered(1)).score;
-  };
-  EXPECT_LT(score_after(view(1, {40, 16})), score_after(view(30)));
 }
 
 // Places that look alike
