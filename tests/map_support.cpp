@@ -20,7 +20,7 @@ namespace loopbit::test {
 LoopDetectorOptions fast_options() {
   LoopDetectorOptions options;
   options.surf = {.working_area_px = 320 * 240, .max_keypoints = 300};
-  options.decision.min_score = 0.02;  // the maps are small
+  options.decision.min_score = 0.5;  // the maps are small
   return options;
 }
 
