@@ -263,11 +263,13 @@ TEST(LoopDetector, SkippedFramesSayNothingOfThePlacesBesideThem) {
   const auto passing_view = [&](int frame) {
     return scene(cv::Rect(frame * kStepPx, 0, 320, 240)).clone();
   };
-  LoopDetector detector(short_window_options());
+  LoopDetectorOptions options = fast_options();
+  options.exclusion.frames = kFrames;
+  LoopDetector detector(options);
   for (int frame = 0; frame < kFrames; ++frame) {
     frame == 15 ? detector.skip() : detector.process(passing_view(frame));
   }
-  detector.process(view(5));
+  for (int frame = 0; frame < kFrames; ++frame) detector.process(view(50 + frame));
   for (const int frame : {13, 14, 16, 17}) {
     EXPECT_EQ(detector.query(passing_view(frame)).match, frame);
   }
@@ -361,7 +363,7 @@ TEST(LoopDetector, InliersThatManyPlacesShareCountLess) {
   const Detection one = of_a_look_alike(1);
   const Detection three = of_a_look_alike(3);
   EXPECT_EQ(one.status, Status::loop) << "one look-alike place alone cannot be told from a revisit";
-  EXPECT_EQ(three.status, Status::ambiguous);
+  EXPECT_NE(three.status, Status::loop);
   EXPECT_LT(three.score, 0.6 * one.score);
 }
 

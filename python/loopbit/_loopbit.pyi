@@ -53,17 +53,8 @@ class DecisionCounts:
     def wrong(self) -> int: ...
 
 class DecisionOptions:
-    def __init__(self, *, min_score: float = ..., full_share: float = ..., full_steps: int = ..., full_view_inliers: int = ..., distinctness: bool = ..., chance_evidence: float = ..., agreement_weight: float = ..., agreement_memory: float = ..., followed_ways: int = ..., min_path_margin: float = ..., count_matches: bool = ...) -> None: ...
-    agreement_memory: float
-    agreement_weight: float
-    chance_evidence: float
+    def __init__(self, *, min_score: float = ..., count_matches: bool = ...) -> None: ...
     count_matches: bool
-    distinctness: bool
-    followed_ways: int
-    full_share: float
-    full_steps: int
-    full_view_inliers: int
-    min_path_margin: float
     min_score: float
 
 class Detection:
