@@ -49,7 +49,7 @@ class MapDamage : public ScratchTest {
       MapReader map(file);
       expect_only_true_places(map);
       for (const MapLoop& loop : map.loops()) {
-        EXPECT_EQ(loop, (MapLoop{{2, 19}, {1, 2}, 30.5, 0.25, 40, 31})) << what;
+        EXPECT_EQ(loop, (MapLoop{{2, 19}, {1, 2}, 0.995, 0.25, 40, 31})) << what;
       }
       const bool whole = check.places == kFrames && check.images == kFrames && check.loops == 1 &&
                          check.sessions == 2;

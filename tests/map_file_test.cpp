@@ -74,7 +74,7 @@ TEST_F(MapFile, KeepsSessionsAndLoopsApart) {
   add_session(map_path_, 6, "second", SessionFrame{1, 4});
   MapReader map(map_path_);
   EXPECT_EQ(places_of(map).back().at, (SessionFrame{2, 5}));
-  const MapLoop loop{{2, 5}, {1, 4}, 30.5, 0.25, 40, 31};
+  const MapLoop loop{{2, 5}, {1, 4}, 0.995, 0.25, 40, 31};
   EXPECT_EQ(map.loops(), std::vector<MapLoop>{loop});
   EXPECT_NE(map.sessions()[0].uid, map.sessions()[1].uid);
 }

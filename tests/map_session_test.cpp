@@ -83,7 +83,7 @@ TEST_F(MapSession, EarlierSessionsAreRecognisedFromTheFirstFrameOn) {
 }
 
 TEST_F(MapSession, TheFirstFrameOfAMapHasNoEarlierPlace) {
-  EXPECT_EQ(drive(0, 0).front().status, Status::no_earlier_place);
+  EXPECT_EQ(drive(0, kPlaces - 1).front().status, Status::no_earlier_place);
   EXPECT_EQ(drive(0, 0).front().status, Status::loop);
 }
 
@@ -210,8 +210,9 @@ TEST_F(MapSession, MatchesSupportEachOtherWithinASessionOnly) {
   };
   const auto one = last_session("one.db", {kPlaces});
   const auto two = last_session("two.db", {12, kPlaces});
-  // Frame 4 shows place 12, the first of the second session.
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(one[i].score, two[i].score);
+  // Frame 4 shows place 12, the first of the second session. What is known of wrong places and
+  // how many steps there are differs a little.
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(one[i].score, two[i].score, 1e-4);
   EXPECT_EQ(two[4].earlier_match, (SessionFrame{2, 0}));
   EXPECT_LT(two[4].score, one[4].score);
   EXPECT_GT(two[8].score, two[4].score);
@@ -224,7 +225,9 @@ TEST_F(MapSession, RemovedPlacesStayRemoved) {
     LoopDetector detector(fast_options(), map);
     detector.remove({1, 7});
     for (int place = 0; place < kPlaces; ++place) {
-      EXPECT_EQ(detector.process(view(place, {4, 0})).status == Status::loop, place != 7) << place;
+      const Detection detection = detector.process(view(place, {4, 0}));
+      EXPECT_NE(detection.earlier_match, (SessionFrame{1, 7})) << place;
+      EXPECT_EQ(detection.earlier_match == (SessionFrame{1, place}), place != 7) << place;
     }
     detector.remove({0, 7});   // no other place shows its scene now
     detector.remove({0, 23});  // still in view, and perhaps not yet committed

@@ -309,7 +309,7 @@ TEST_F(MapTools, ExportsNumberFramesThroughAllSessions) {
   MapReader map(path("a.db"));
   EXPECT_EQ(export_loops(map, ExportFormat::csv),
             "query,match,score,query_session,query_frame,match_session,match_frame,similarity,"
-            "matches,inliers\n14,7,30.5,2,4,1,7,0.250000,40,31\n");
+            "matches,inliers\n14,7,0.995,2,4,1,7,0.250000,40,31\n");
   EXPECT_EQ(export_loops(map, ExportFormat::g2o),
             "VERTEX_SE3:QUAT 7 0 0 0 0 0 0 1\nVERTEX_SE3:QUAT 14 0 0 0 0 0 0 1\n"
             "EDGE_SE3:QUAT 7 14 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n");
