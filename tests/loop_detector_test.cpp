@@ -180,10 +180,10 @@ TEST(LoopDetector, FramesThatMatchedElsewhereDoNotSupportALoop) {
   LoopDetector detector = after_places(0, kLap - 1, fast_options());
   // While it stands here, all places of the lap become candidates.
   for (int i = 0; i < 16; ++i) detector.process(view(50));
-  const double alone = detector.query(half_covered(10)).score;
+  const double alone = detector.query(half_covered(20)).score;
   detector.process(again(2));
   detector.process(again(3));
-  EXPECT_LT(detector.process(half_covered(10)).score, alone);
+  EXPECT_LT(detector.process(half_covered(20)).score, alone);
 }
 
 TEST(LoopDetector, StandingStillAddsNoEvidence) {
@@ -212,48 +212,6 @@ TEST(LoopDetector, MinScoreItselfIsEnough) {
   EXPECT_EQ(rejected.status, Status::low_score);
   EXPECT_EQ(rejected.match, loop.match);
   EXPECT_EQ(rejected.score, loop.score);
-}
-
-TEST(LoopDetector, LoopIsTheBestNeighbourOfItsCandidate) {
-  // A blurred picture of the same spot looks most alike, and so keeps its neighbour from being a
-  // candidate; but the sharp one from further beside shares more features.
-  cv::Mat blurred;
-  cv::GaussianBlur(view(1), blurred, {0, 0}, 2.0);
-  LoopDetector detector(short_window_options());
-  detector.process(view(5));
-  detector.process(blurred);
-  detector.process(view(1, {20, 8}));
-  detector.process(view(6));
-  const Detection detection = detector.query(view(1, {1, 1}));
-  EXPECT_EQ(detection.match, 2);
-}
-
-TEST(LoopDetector, LoopIsWhereAllNeighboursTellThatItIs) {
-  // Something stands before the place itself, so that those beside it share more with the query;
-  // but what these share with it grows towards that place from either side.
-  constexpr int kStepPx = 60;
-  constexpr int kNearest = 4;
-  const cv::Mat1b scene = textured_image({9 * kStepPx + 320, 250}, 1);
-  const auto passing_view = [&](int frame, cv::Point beside_px) {
-    return scene(cv::Rect(cv::Point(frame * kStepPx, 0) + beside_px, cv::Size(320, 240))).clone();
-  };
-  LoopDetector detector(short_window_options());
-  for (int frame = 0; frame < 9; ++frame) {
-    cv::Mat1b image = passing_view(frame, {0, 0});
-    if (frame == kNearest) image(cv::Rect(120, 0, 80, 240)) = 128;
-    detector.process(image);
-  }
-  detector.process(view(5));
-  const Detection detection = detector.query(passing_view(kNearest, {2, 3}));
-  EXPECT_EQ(detection.match, kNearest);
-  const auto matches_with = [&](const cv::Mat1b& place) {
-    const SurfOptions& surf = detector.options().surf;
-    return match_features(extract_surf(passing_view(kNearest, {2, 3}), surf),
-                          extract_surf(place, surf), 0.8)
-        .size();
-  };
-  EXPECT_GT(matches_with(passing_view(kNearest + 1, {0, 0})),
-            static_cast<std::size_t>(detection.matches));
 }
 
 TEST(LoopDetector, SkippedFramesSayNothingOfThePlacesBesideThem) {
@@ -327,13 +285,6 @@ TEST(LoopDetector, AFirstLookFindsAsManyLoopsInRealImages) {
   }
   EXPECT_GT(loops, 30);
   EXPECT_GE(loops, thorough_loops - 1);
-}
-
-TEST(LoopDetector, EvidenceCountsLessWhileTheMapIsSmall) {
-  const auto score_in_a_map_of = [](int places) {
-    return after_places(1, places, short_window_options()).query(half_covered(1)).score;
-  };
-  EXPECT_LT(score_in_a_map_of(4), score_in_a_map_of(7));
 }
 
 // Places that look alike

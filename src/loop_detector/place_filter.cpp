@@ -369,6 +369,11 @@ PlaceFilter::Update PlaceFilter::update(
                 [](const Hypothesis& h) { return h.probability() < kMinProbability; });
   update.prior = std::move(prior);
   choose_match(num_steps, loops, update);
+  // A path may end at any frame: one that speaks against its match is no loop.
+  if (update.match) {
+    const double ratio = update.observed[*update.match].log_likelihood_ratio();
+    update.probability *= std::min(1.0, std::exp(ratio));
+  }
   update.probability = rounded(update.probability);
   update.revisit = rounded(update.revisit);
   return update;
