@@ -176,16 +176,6 @@ TEST(LoopDetector, FramesBeforeSupportALoop) {
   }
 }
 
-TEST(LoopDetector, FramesThatMatchedElsewhereDoNotSupportALoop) {
-  LoopDetector detector = after_places(0, kLap - 1, fast_options());
-  // While it stands here, all places of the lap become candidates.
-  for (int i = 0; i < 16; ++i) detector.process(view(50));
-  const double alone = detector.query(half_covered(20)).score;
-  detector.process(again(2));
-  detector.process(again(3));
-  EXPECT_LT(detector.process(half_covered(20)).score, alone);
-}
-
 TEST(LoopDetector, StandingStillAddsNoEvidence) {
   LoopDetector detector = after_places(0, kLap - 1, fast_options());
   // While it stands here, all places of the lap become candidates.

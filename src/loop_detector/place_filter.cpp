@@ -218,9 +218,9 @@ void choose_match(std::ptrdiff_t num_steps, const KnownLoops& loops, PlaceFilter
         return ratio(o) + std::log(std::max(update.prior.at(o.step), from_anywhere));
       });
   if (!best || is_near(update.observed[*best].step, *middle, loops)) return;
-  // Where the likeliest step may not be a candidate, no path speaks for the best one.
-  if (!update.match) update.probability = update.belief.at(update.observed[*best].step);
-  update.probability = std::min(update.probability, update.revisit);
+  // No path speaks for it, so it is as probable as after a return from somewhere new.
+  const double odds = 2 * from_anywhere * std::exp(ratio(update.observed[*best]));
+  update.probability = std::min(update.revisit, odds / (1 + odds));
   update.match = best;
 }
 
