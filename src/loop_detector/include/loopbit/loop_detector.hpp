@@ -29,9 +29,9 @@ using AllowedPlaces = std::variant<std::monostate, std::function<bool(const Sess
 /// Tells for each camera image whether the camera has been here before.
 ///
 /// H. Wang, J. Li, M. Ran, L. Xie, "Fast Loop Closure Detection via Binary Content", 2019. Binary
-/// content finds similar earlier places, SURF features and epipolar geometry verify them, and a Bayes
-/// filter over places gives the probability that the camera is back. The same images give the same answers
-/// on any processor.
+/// content finds similar earlier places, SURF features and epipolar geometry verify them, and a
+/// Bayes filter over places gives the probability that the camera is back. The same images give the
+/// same answers on any processor.
 ///
 /// Several threads may call const functions at once, such as query(). Other functions need the
 /// detector for themselves, so lock a std::shared_mutex: shared for query(), exclusive for

@@ -83,8 +83,8 @@ inline constexpr std::array<std::string_view, 2> kPresets{"default", "paper"};
 
 /// `default`: LoopDetectorOptions{}. `paper`: the pipeline of Wang et al. 2019 as published, to
 /// compare with: every earlier place beyond a fixed xi and with a near enough centre M is matched
-/// with rotated SURF, and their number decides, without geometry or frames before. The paper names no
-/// values; those here are ours. Throws Error (kind option) for other names.
+/// with rotated SURF, and their number decides, without geometry or frames before. The paper names
+/// no values; those here are ours. Throws Error (kind option) for other names.
 LoopDetectorOptions preset(std::string_view name);
 
 /// Throws Error for the first setting out of its range, and where two settings contradict.
