@@ -97,11 +97,13 @@ def test_rejected_loops_and_removed_places(images):
     assert loop.is_loop
     detector.reject(loop)
     assert not detector.query(images[80]).is_loop
-    next_loop = detector.process(images[83])
+    # Without the path that was rejected, it takes a few frames to be sure again.
+    for image in images[81:86]:
+        next_loop = detector.process(image)
     assert next_loop.is_loop
     for frame in range(next_loop.match - 2, next_loop.match + 3):
         detector.remove(frame)
-    assert abs((detector.query(images[83]).match or 999) - next_loop.match) > 2
+    assert abs((detector.query(images[85]).match or 999) - next_loop.match) > 2
 
 
 def test_every_status_is_explained():
