@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <functional>
 #include <optional>
-#include <span>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -46,11 +45,10 @@ class PlaceFilter {
     [[nodiscard]] double at(std::ptrdiff_t step) const;
   };
 
-  /// The terms of the log odds of the match, in nats.
+  /// The terms of the log likelihood ratio of a candidate, in nats.
   struct Terms {
     double votes = 0;     ///< log likelihood ratio of its displacement votes
     double geometry = 0;  ///< the same of its inliers
-    double path = 0;      ///< log odds from the frames before
   };
 
   /// A candidate of the frame, as the filter sees it.
