@@ -30,17 +30,28 @@ int thread_count(int wanted) {
   return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
-RunOutcome run_with_progress(RunInput& input, const SessionFlags& flags,
+/// Null without --live.
+std::unique_ptr<LivePage> open_live_page(const SessionFlags& flags) {
+  if (!flags.live_port) return nullptr;
+  auto page = std::make_unique<LivePage>(
+      LivePage::Options{.address = flags.live_address, .port = *flags.live_port});
+  tell(fmt::format("loopbit: live page: {}\n", page->url()));
+  return page;
+}
+
+/// `live` may be null.
+RunOutcome run_with_progress(RunInput& input, const SessionFlags& flags, LivePage* live,
                              const std::atomic<bool>& stop) {
   Progress progress(input.size(), {.shown = !flags.quiet});
   JsonLines lines;
-  return record_run(input, flags.run,
-                    {[&](const Detection& detection) {
-                       progress.advance(detection.status == Status::loop);
-                       if (flags.json) lines.add(detection);
-                     },
-                     [&](const std::string& sentence) { progress.report(sentence); }},
-                    stop);
+  const RunListener listener{
+      .on_detection =
+          [&](const Detection& detection) {
+            progress.advance(detection.status == Status::loop);
+            if (flags.json) lines.add(detection);
+          },
+      .on_bad_frame = [&](const std::string& sentence) { progress.report(sentence); }};
+  return record_run(input, flags.run, live ? live->beside(listener) : listener, stop);
 }
 
 /// Leaves out a camera that was found and is not the one of `frames`, and says so.
@@ -83,6 +94,25 @@ void SessionFlags::add_to(CLI::App& command) {
       "--no-report", [this] { run.evidence = false; },
       "Store no pictures and write no report.html");
   command.add_flag("--open", open, "Open the report in the browser")->excludes(left_out);
+  CLI::Option* live =
+      command
+          .add_option(
+              "--live", live_port,
+              fmt::format("Serve the report at http://127.0.0.1:PORT/ while the run goes on; "
+                          "default: {}, 0 = any free port",
+                          kLivePort))
+          ->type_name("[PORT]")
+          ->expected(0, 1)
+          ->default_str(std::to_string(kLivePort))
+          ->check(whole_number(0, 65535))
+          ->excludes(left_out);
+  command
+      .add_option(
+          "--live-address", live_address,
+          "Serve it on this address of the machine, to others, at a URL with a secret token; "
+          "0.0.0.0 = all addresses")
+      ->type_name("ADDRESS")
+      ->needs(live);
   add_report_flag(command, report);
   command.add_flag("--json", json,
                    "Print one JSON object per loop, one per line, as soon as it is found, and a "
@@ -144,13 +174,15 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   if (request.threads > 1) source = prefetch(std::move(source), kFramesReadAhead);
   RunInput frames(std::move(source), input, sampling);
   if (flags.found_camera) drop_other_camera(request, frames);
-  const RunOutcome outcome = run_with_progress(frames, flags, stop);
+  const std::unique_ptr<LivePage> live = open_live_page(flags);
+  const RunOutcome outcome = run_with_progress(frames, flags, live.get(), stop);
   if (!outcome.record.early_end.empty()) {
     tell(fmt::format("loopbit: {}\n", outcome.record.early_end));
   }
   warn_of_damage(request.map, outcome.map_damage);
   const std::string report = request.evidence ? report_in(outcome.folder) : "";
   if (!report.empty()) write_report(report, {report_run(outcome.folder)}, flags.report);
+  if (live) live->finish(report);
   if (flags.json) {
     JsonLines::finish(outcome, report);
   } else if (!flags.quiet) {

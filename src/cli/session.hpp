@@ -4,12 +4,14 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "loopbit/image_source.hpp"
+#include "loopbit/live_page.hpp"
 #include "loopbit/record_run.hpp"
 #include "loopbit/report.hpp"
 
@@ -26,6 +28,8 @@ struct SessionFlags {
   bool json = false;                  ///< JSON in place of the summary
   bool quiet = false;                 ///< no progress, no summary
   ReportOptions report;
+  std::optional<int> live_port;  ///< of the live page; none = no such page
+  std::string live_address = LivePage::Options{}.address;
   bool found_camera = false;  ///< run.camera was not named by the user; it may be of other images
 
   void add_to(CLI::App& command);

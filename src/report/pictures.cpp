@@ -89,13 +89,6 @@ std::vector<const FrameView*> by_priority(const std::vector<FrameView>& frames) 
   return order;
 }
 
-Json picture(const StoredEvidence& evidence) {
-  return {{"jpeg", base64(evidence.picture_jpeg)},
-          {"saliency", base64(evidence.saliency_png)},
-          {"content", base64_of(std::span<const std::uint64_t>(evidence.content.rows))},
-          {"inliers", base64_of(std::span<const PointPair>(evidence.inliers))}};
-}
-
 std::size_t size_of(const Json& picture) {
   constexpr std::size_t kNames = 70;  // keys, quotes and commas
   std::size_t bytes = kNames;
@@ -105,6 +98,13 @@ std::size_t size_of(const Json& picture) {
 }
 
 }  // namespace
+
+Json picture(const StoredEvidence& evidence) {
+  return {{"jpeg", base64(evidence.picture_jpeg)},
+          {"saliency", base64(evidence.saliency_png)},
+          {"content", base64_of(std::span<const std::uint64_t>(evidence.content.rows))},
+          {"inliers", base64_of(std::span<const PointPair>(evidence.inliers))}};
+}
 
 int first_frame(const std::vector<FrameView>& frames) {
   const auto first = [&](const char* verdict) {

@@ -25,6 +25,9 @@ struct FrameView {
 /// score, the first missed revisit, or 0.
 int first_frame(const std::vector<FrameView>& frames);
 
+/// The picture of one frame, as the page reads it.
+nlohmann::ordered_json picture(const StoredEvidence& evidence);
+
 /// Pictures by frame number, as many as fit into `max_bytes` of JSON, a frame together with its
 /// partners. First come the first_frame(), wrong loops and the weakest loops. Then verdicts take
 /// turns; within a verdict frames are spread evenly over the run.

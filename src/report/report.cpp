@@ -16,6 +16,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/evidence_file.hpp"
+#include "loopbit/growing_report.hpp"
 #include "loopbit/judge.hpp"
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/revisits.hpp"
@@ -35,6 +36,9 @@ using Json = nlohmann::ordered_json;
 using report::FrameView;
 
 constexpr std::string_view kDataPlace = "@REPORT_DATA@";
+// Of the page's Content-Security-Policy.
+constexpr std::string_view kNoConnection = "connect-src 'none'";
+constexpr std::string_view kOwnConnection = "connect-src 'self'";
 
 struct FrameCount {
   int frames = 0;
@@ -228,14 +232,17 @@ void add_match_columns(Json& json, const MatchList& list, int frames) {
   }
 }
 
+Json names_column(const std::vector<Detection>& detections) {
+  const auto has_name = [](const Detection& d) { return !d.name.empty(); };
+  if (std::none_of(detections.begin(), detections.end(), has_name)) return nullptr;
+  return column(detections, [](const Detection& d) { return d.name; });
+}
+
 /// Of the images, by the first run that knows them: all runs are on the same images. Null if none.
 Json names_of(int frames, const std::vector<ReportRun>& runs) {
   for (const ReportRun& run : runs) {
     if (!run.run || run.run->detections.size() != static_cast<std::size_t>(frames)) continue;
-    const auto& detections = run.run->detections;
-    const auto has_name = [](const Detection& d) { return !d.name.empty(); };
-    if (std::none_of(detections.begin(), detections.end(), has_name)) continue;
-    return column(detections, [](const Detection& d) { return d.name; });
+    if (Json names = names_column(run.run->detections); !names.is_null()) return names;
   }
   return nullptr;
 }
@@ -361,11 +368,22 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
   return json;
 }
 
+std::string text_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 void replace_all(std::string& text, std::string_view from, std::string_view to) {
   for (std::size_t at = text.find(from); at != std::string::npos;
        at = text.find(from, at + to.size())) {
     text.replace(at, from.size(), to);
   }
+}
+
+std::string with_data(std::string page, std::string json) {
+  // The data must not close the HTML element that contains it.
+  replace_all(json, "<", "\\u003c");
+  page.replace(page.find(kDataPlace), kDataPlace.size(), json);
+  return page;
 }
 
 }  // namespace
@@ -380,7 +398,7 @@ std::string report_json(const std::vector<ReportRun>& runs, const ReportOptions&
   for (const ReportRun& run : runs) {
     json["runs"].push_back(run_json(run, runs, static_cast<std::size_t>(max_bytes)));
   }
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return text_of(json);
 }
 
 ReportRun to_report_run(const std::string& name, FinishedRun run) {
@@ -396,12 +414,36 @@ ReportRun to_report_run(const std::string& name, FinishedRun run) {
 
 void write_report(const std::string& path, const std::vector<ReportRun>& runs,
                   const ReportOptions& options) {
-  std::string json = report_json(runs, options);
-  // The data must not close the HTML element that contains it.
-  replace_all(json, "<", "\\u003c");
+  write_file(path, with_data(std::string(report::kPage), report_json(runs, options)));
+}
+
+std::string growing_report(const std::string& name, const std::string& record_json,
+                           const std::string& id) {
+  Json json = Json::parse(report_json({to_report_run(name, {})}));
+  Json& run = json["runs"][0];
+  run["record"] = Json::parse(record_json);
+  run["threshold"] = run["record"]["options"]["decision"]["min_score"];
+  run["frames_known"] = true;
+  json["live"] = id;
   std::string page(report::kPage);
-  page.replace(page.find(kDataPlace), kDataPlace.size(), json);
-  write_file(path, page);
+  replace_all(page, kNoConnection, kOwnConnection);
+  return with_data(std::move(page), text_of(json));
+}
+
+std::string report_columns(const std::vector<Detection>& detections) {
+  Json json;
+  json["timestamp_s"] = column(
+      detections, [](const Detection& d) { return d.timestamp_s ? Json(*d.timestamp_s) : Json(); });
+  json["match"] = column(detections, [](const Detection& d) { return d.match.value_or(-1); });
+  json["verdict"] = column(
+      detections, [](const Detection& d) { return d.status == Status::loop ? "loop" : "none"; });
+  json["names"] = names_column(detections);
+  add_own_columns(json, detections);
+  return text_of(json);
+}
+
+std::string report_picture(const StoredEvidence& evidence) {
+  return report::picture(evidence).dump();
 }
 
 }  // namespace loopbit

@@ -22,7 +22,6 @@ using Bytes = std::vector<unsigned char>;
 static_assert(std::endian::native == std::endian::little, "the file's numbers are little-endian");
 static_assert(sizeof(PointPair) == 4 * sizeof(float));
 
-constexpr int kFramesPerTransaction = 32;
 constexpr int kFormatVersion = 1;
 
 Database open_evidence(const std::string& path, Database::Access access) {
@@ -79,18 +78,21 @@ class EvidenceWriter::Impl {
         std::make_unique<Statement>(database_, "INSERT INTO frame VALUES (?1, ?2, ?3, ?4, ?5)");
   }
 
-  void add(PlaceId frame, const cv::Mat& image, const Evidence& evidence) {
+  StoredEvidence add(PlaceId frame, const cv::Mat& image, const Evidence& evidence) {
     if (pending_ == 0) database_.execute("BEGIN");
-    const Bytes picture = picture_jpeg(image);
-    const Bytes saliency = saliency_png(evidence.saliency);
+    StoredEvidence stored{.picture_jpeg = picture_jpeg(image),
+                          .saliency_png = saliency_png(evidence.saliency),
+                          .content = evidence.content,
+                          .inliers = evidence.inliers};
     insert_->bind(1, std::int64_t{frame});
-    insert_->bind(2, picture);
-    insert_->bind(3, saliency);
-    insert_->bind(4, bytes_of(std::span<const std::uint64_t>(evidence.content.rows)));
-    insert_->bind(5, bytes_of(std::span<const PointPair>(evidence.inliers)));
+    insert_->bind(2, stored.picture_jpeg);
+    insert_->bind(3, stored.saliency_png);
+    insert_->bind(4, bytes_of(std::span<const std::uint64_t>(stored.content.rows)));
+    insert_->bind(5, bytes_of(std::span<const PointPair>(stored.inliers)));
     insert_->step();
     insert_->reset();
     if (++pending_ == kFramesPerTransaction) save();
+    return stored;
   }
 
   /// Readers that may not write need a file without a log beside it.
@@ -118,8 +120,8 @@ EvidenceWriter::~EvidenceWriter() {
   } catch (...) {  // told by finish(), to those who ask
   }
 }
-void EvidenceWriter::add(PlaceId frame, const cv::Mat& image, const Evidence& evidence) {
-  impl_->add(frame, image, evidence);
+StoredEvidence EvidenceWriter::add(PlaceId frame, const cv::Mat& image, const Evidence& evidence) {
+  return impl_->add(frame, image, evidence);
 }
 void EvidenceWriter::finish() { impl_->finish(); }
 

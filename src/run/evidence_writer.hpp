@@ -21,7 +21,8 @@ class EvidenceWriter {
   EvidenceWriter(EvidenceWriter&&) = delete;
   EvidenceWriter& operator=(EvidenceWriter&&) = delete;
 
-  void add(PlaceId frame, const cv::Mat& image, const Evidence& evidence);
+  /// Returns what it stores.
+  StoredEvidence add(PlaceId frame, const cv::Mat& image, const Evidence& evidence);
 
   /// Saves the remaining frames.
   void finish();

@@ -184,9 +184,11 @@ class RecordedRun {
       evidence.emplace(folder_.evidence_path());
       recording.on_evidence = [&](const Detection& detection, const cv::Mat& image,
                                   const Evidence& seen) {
-        evidence->add(detection.frame, image, seen);
+        const StoredEvidence stored = evidence->add(detection.frame, image, seen);
+        if (listener.on_stored) listener.on_stored(detection, stored);
       };
     }
+    if (listener.on_start) listener.on_start(folder_.path());
     run(input_, detector, recording, stop);
     record_.early_end = input_.early_end();
     if (map) map_damage_ = map->damage();

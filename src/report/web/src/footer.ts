@@ -66,25 +66,20 @@ function inputOf({ arguments: given, input }: RunRecord): string {
 export class Footer implements View {
   readonly element: HTMLElement;
   private readonly details = html("div", { class: "origin-details" });
+  private readonly origin = html("p", { class: "small" });
 
   constructor(
     private readonly version: string,
     private readonly defaults: Options | undefined,
   ) {
-    this.element = html(
-      "footer",
-      {},
-      html("h2", {}, "About this run"),
-      this.details,
-      html(
-        "p",
-        { class: "small" },
-        `Written by loopbit ${this.version}. This page is self-contained: it loads nothing and sends nothing.`,
-      ),
-    );
+    this.element = html("footer", {}, html("h2", {}, "About this run"), this.details, this.origin);
   }
 
   showRun(model: RunModel): void {
+    const loads = model.isLive
+      ? "This page asks nobody but the loopbit that serves it, and sends nothing else."
+      : "This page is self-contained: it loads nothing and sends nothing.";
+    this.origin.textContent = `Written by loopbit ${this.version}. ${loads}`;
     const { record } = model.run;
     if (!record) {
       this.details.replaceChildren(

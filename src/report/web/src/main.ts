@@ -8,13 +8,15 @@ import "./times.css";
 import "./pair.css";
 import "./pictures.css";
 import "./footer.css";
+import "./live.css";
 import "./print.css";
 import { button, html } from "./dom.ts";
 import { Footer } from "./footer.ts";
 import { keyHelp, listenToKeys } from "./keyboard.ts";
+import { Live } from "./live.ts";
 import { Matrix } from "./matrix.ts";
 import { PairBrowser } from "./pair_browser.ts";
-import { startPlots } from "./plot.ts";
+import { showGrowth, startPlots } from "./plot.ts";
 import { PrecisionRecall } from "./precision_recall.ts";
 import { followPrinting } from "./printing.ts";
 import type { ReportData } from "./report_data.ts";
@@ -40,7 +42,7 @@ function plotsOf(store: Store, models: readonly RunModel[]): View[] {
   return views;
 }
 
-function bar(opener: HTMLElement): HTMLElement {
+function bar(live: HTMLElement | null, opener: HTMLElement): HTMLElement {
   return html(
     "div",
     { class: "bar-top" },
@@ -48,6 +50,7 @@ function bar(opener: HTMLElement): HTMLElement {
     html(
       "span",
       { class: "tools" },
+      live,
       button({ id: "theme", "aria-label": "Light or dark" }, toggleScheme, "light / dark"),
       opener,
     ),
@@ -55,7 +58,7 @@ function bar(opener: HTMLElement): HTMLElement {
 }
 
 function start(data: ReportData): void {
-  const models = data.runs.map((run) => new RunModel(run));
+  const models = data.runs.map((run) => new RunModel(run, data.live !== undefined));
   if (models.length === 0) throw new Error("the report holds no run");
   const store = new Store(models);
   const summary = new Summary(store, models);
@@ -65,12 +68,21 @@ function start(data: ReportData): void {
   const views: View[] = [summary, pair, ...plots, footer];
   const { dialog, opener } = keyHelp();
 
-  const showRun = () => {
-    for (const view of views) view.showRun(store.model);
+  const showRun = (shown: readonly View[] = views) => {
+    for (const view of shown) view.showRun(store.model);
   };
   const showSelection = () => {
     for (const view of views) view.showSelection(store.now);
   };
+  const live =
+    data.live === undefined
+      ? null
+      : new Live(
+          data.live,
+          store,
+          () => showGrowth(() => showRun([summary, pair, ...plots])),
+          () => pair.showSelection(store.now),
+        );
   store.subscribe((now, before) => {
     if (now.run !== before.run) showRun();
     showSelection();
@@ -78,7 +90,7 @@ function start(data: ReportData): void {
   document
     .getElementById("report")
     ?.replaceChildren(
-      bar(opener),
+      bar(live?.element ?? null, opener),
       summary.element,
       html(
         "div",
@@ -95,6 +107,7 @@ function start(data: ReportData): void {
   listenToKeys(store, pair, dialog);
   followPrinting();
   void startPlots().then(() => performance.mark("report-drawn"));
+  live?.start();
 }
 
 start(readData());

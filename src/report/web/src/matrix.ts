@@ -98,9 +98,12 @@ export class Matrix implements View {
       ? outlined
       : "There is no ground truth. --truth FILE outlines the true pairs.";
     const matrix = model.run.similarity_matrix;
+    const none = model.isLive
+      ? "The similarities of all frames are shown when the run has ended."
+      : "The run stored no binary contents to compare.";
     this.caption.textContent = matrix
       ? `${meaningOfCells(matrix)} ${truth} Click a cell to see its two frames.`
-      : `Loops by query and match. The run stored no binary contents to compare. ${truth}`;
+      : `Loops by query and match. ${none} ${truth}`;
     this.key.replaceChildren();
   }
 

@@ -23,6 +23,7 @@ export function partnerName(model: RunModel, selection: Selection): string {
 /** Why a frame of this run has no picture, and how to get one. */
 export function absenceOf(model: RunModel, frame: number): string {
   if (!model.isReadable(frame)) return "This image could not be read.";
+  if (model.isLive) return "This picture is on its way.";
   const pictures = Object.keys(model.run.pictures).length;
   if (pictures === 0) {
     return model.run.record

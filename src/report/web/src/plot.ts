@@ -20,6 +20,18 @@ export function resizePlots(): void {
   for (const plot of plots) plot.resize();
 }
 
+let isGrowing = false;
+
+/** Shows data that have grown: a plot that someone zoomed keeps what it shows. */
+export function showGrowth(show: () => void): void {
+  isGrowing = true;
+  try {
+    show();
+  } finally {
+    isGrowing = false;
+  }
+}
+
 /** Draws the plots one by one, each after the previous one is on the screen. */
 export async function startPlots(): Promise<void> {
   for (const plot of plots) {
@@ -105,6 +117,13 @@ export class Plot implements PlotInput {
 
   /** Shows everything again, after the data changed. */
   reset(): void {
+    const { view } = this;
+    const isZoomed = view !== this.home;
+    this.goHome();
+    if (isGrowing && isZoomed) this.show(view);
+  }
+
+  private goHome(): void {
     this.home = this.spec.bounds();
     this.show(this.home);
     const plot = this.plot;

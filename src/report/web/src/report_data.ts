@@ -9,6 +9,8 @@ export interface ReportData {
   runs: Run[];
   /** The default settings, as in `loopbit options --json`. */
   default_options?: RunRecord["options"];
+  /** Of a run that goes on: its ID, by which the server knows it. See live.ts. */
+  live?: string;
 }
 
 /** The verdict on a frame. Only revisits can be `missed`. */

@@ -40,15 +40,22 @@ export interface EarlierFrame {
 /** A run, and values derived from its columns. */
 export class RunModel {
   /** Total milliseconds per frame; null if the detector does not report them. */
-  readonly totals_ms: readonly number[] | null;
+  totals_ms: readonly number[] | null;
   /** The revisits that are drawn as one: those of several loops. */
   readonly longRevisits: readonly Revisit[];
   private readonly truth = new Map<number, Span[]>();
   private readonly members = new Map<Filter, readonly number[]>();
   private readonly marked = new Map<Marked, readonly number[]>();
 
-  constructor(readonly run: Run) {
+  private size: number;
+
+  /** `isLive`: frames are still being added. */
+  constructor(
+    readonly run: Run,
+    readonly isLive = false,
+  ) {
     this.totals_ms = totals(run);
+    this.size = run.frames;
     this.longRevisits = run.revisits.filter(({ loops }) => loops >= kLongRevisit);
     const triples = run.truth?.same_place ?? [];
     for (let i = 0; i + 2 < triples.length; i += 3) {
@@ -61,6 +68,19 @@ export class RunModel {
 
   get frames(): number {
     return this.run.frames;
+  }
+
+  /** Whether frames were added since the last grow(). */
+  hasGrown(): boolean {
+    return this.run.frames !== this.size;
+  }
+
+  /** Takes in the frames that were added to the run. */
+  grow(): void {
+    this.size = this.run.frames;
+    this.totals_ms = totals(this.run);
+    this.members.clear();
+    this.marked.clear();
   }
 
   verdict(frame: number): Verdict {

@@ -64,7 +64,12 @@ export class Store {
     }
   }
 
-  change(to: Partial<Selection>): void {
+  /** Selects a frame for now: the address keeps what it has. */
+  show(frame: number): void {
+    this.change({ frame, against: "match" }, false);
+  }
+
+  change(to: Partial<Selection>, isStored = true): void {
     const before = this.selection;
     this.selection = this.valid({ ...before, ...to });
     const { run, frame, against, filter, order } = this.selection;
@@ -75,7 +80,7 @@ export class Store {
       filter === before.filter &&
       order === before.order;
     if (same) return;
-    this.toAddress();
+    if (isStored) this.toAddress();
     for (const listener of this.listeners) listener(this.selection, before);
   }
 

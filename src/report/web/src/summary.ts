@@ -22,6 +22,7 @@ export function sentenceOf(model: RunModel): string {
       elsewhere > 0
         ? `, ${elsewhere === loops ? "all" : `${format.count(elsewhere)} of them`} into earlier sessions of the map`
         : "";
+    if (model.isLive) return `${capital(format.counted(loops, "loop"))}${frames} so far${where}.`;
     return `${capital(format.counted(loops, "loop"))} found${frames}${where}; there is no truth to ${unknown}.`;
   }
   const { right, positives, wrong, tolerated } = evaluation;
@@ -113,7 +114,7 @@ export class Summary implements View {
     this.sentence.textContent = names.length > 1 ? sentenceOfAll(this.models) : sentenceOf(model);
     this.shown.hidden = names.length < 2;
     this.shown.textContent = `Shown below: ${run.name}. ${sentenceOf(model)}`;
-    const notice = noticeOf(run);
+    const notice = noticeOf(model);
     this.notice.textContent = notice;
     this.notice.hidden = notice === "";
     this.numbers.replaceChildren(...keyNumbers(model, this.models.length > 1));
@@ -124,7 +125,8 @@ export class Summary implements View {
   showSelection(_: Selection): void {}
 }
 
-function noticeOf({ record, times_ms: times }: Run): string {
+function noticeOf({ run: { record, times_ms: times }, isLive }: RunModel): string {
+  if (isLive) return "";
   if (record) {
     if (record.stopped_by === "running") {
       return "The run has not ended, or was killed. The page shows its state when the page was written.";

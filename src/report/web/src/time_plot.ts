@@ -65,8 +65,8 @@ export class TimePlot {
 
   private bounds(): Bounds {
     const model = this.store.model;
-    if (this.shown !== model) {
-      this.shown = model;
+    if (this.shown !== model.totals_ms) {
+      this.shown = model.totals_ms;
       this.bins = this.isDistribution
         ? binsByTime(model, Math.max(1, Math.min(kTimeBins, model.frames)))
         : binsByFrame(model, kStretches);

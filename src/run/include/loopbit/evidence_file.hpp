@@ -14,6 +14,9 @@
 
 namespace loopbit {
 
+/// Frames that are saved together: as many of the latest ones may not be in the file yet.
+inline constexpr int kFramesPerTransaction = 32;
+
 /// The picture of a frame and the evidence of its decision, stored for people.
 struct StoredEvidence {
   std::vector<unsigned char> picture_jpeg;  ///< see picture_jpeg()

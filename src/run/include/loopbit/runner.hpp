@@ -9,6 +9,7 @@
 #include <string>
 
 #include "loopbit/detection.hpp"
+#include "loopbit/evidence_file.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 
@@ -20,6 +21,10 @@ struct RunListener {
   std::function<void(const std::string&)> on_bad_frame;  ///< one sentence; its row follows
   /// Optional: for each readable frame, after on_detection.
   std::function<void(const Detection&, const cv::Mat& image, const Evidence&)> on_evidence = {};
+  /// Optional, called by record_run() only: before the first frame, with the run's folder.
+  std::function<void(const std::string& folder)> on_start = {};
+  /// Optional, called by record_run() only: what it stores of a readable frame, after on_detection.
+  std::function<void(const Detection&, const StoredEvidence&)> on_stored = {};
 };
 
 /// Checks the first usable frame. Throws Error (kind option) if exclusion.seconds is set and the
