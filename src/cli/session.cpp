@@ -4,12 +4,19 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
+#include <filesystem>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 #include <opencv2/core/utility.hpp>
 
+#include "loopbit/error.hpp"
+#include "loopbit/finished_run.hpp"
+#include "loopbit/mcap_export.hpp"
 #include "loopbit/run_input.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
 #include "json_lines.hpp"
@@ -22,12 +29,28 @@
 namespace loopbit::cli {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr std::size_t kFramesReadAhead = 8;
 
 /// No more than there are cores that this process may use: TBB warns of more.
 int thread_count(int wanted) {
   const int cores = cv::getNumberOfCPUs();
   return wanted > 0 ? std::min(wanted, cores) : cores;
+}
+
+/// Throws Error if the file of --mcap-out is the input, or its folder is not there: a run may be
+/// long.
+void check_mcap_out(const SessionFlags& flags, const std::string& input) {
+  if (flags.mcap_out.empty()) return;
+  const fs::path file = fs::absolute(flags.mcap_out);
+  std::error_code error;
+  if (fs::equivalent(file, input, error)) {
+    throw Error(ErrorKind::option,
+                fmt::format("--mcap-out '{}' is the input; name another file.", flags.mcap_out));
+  }
+  if (fs::is_directory(file, error)) throw cannot_write(flags.mcap_out, EISDIR);
+  if (!fs::is_directory(file.parent_path(), error)) throw cannot_write(flags.mcap_out, ENOENT);
 }
 
 /// Null without --live.
@@ -94,6 +117,12 @@ void SessionFlags::add_to(CLI::App& command) {
       "--no-report", [this] { run.evidence = false; },
       "Store no pictures and write no report.html");
   command.add_flag("--open", open, "Open the report in the browser")->excludes(left_out);
+  command
+      .add_option(
+          "--mcap-out", mcap_out,
+          "Also write the loops as an MCAP file for Foxglove or Lichtblick: scene, pictures of "
+          "each pair, scores and times")
+      ->type_name("FILE");
   CLI::Option* live =
       command
           .add_option(
@@ -174,6 +203,7 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   if (request.threads > 1) source = prefetch(std::move(source), kFramesReadAhead);
   RunInput frames(std::move(source), input, sampling);
   if (flags.found_camera) drop_other_camera(request, frames);
+  check_mcap_out(flags, input);
   const std::unique_ptr<LivePage> live = open_live_page(flags);
   const RunOutcome outcome = run_with_progress(frames, flags, live.get(), stop);
   if (!outcome.record.early_end.empty()) {
@@ -183,6 +213,7 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   const std::string report = request.evidence ? report_in(outcome.folder) : "";
   if (!report.empty()) write_report(report, {report_run(outcome.folder)}, flags.report);
   if (live) live->finish(report);
+  if (!flags.mcap_out.empty()) write_mcap(flags.mcap_out, read_run(outcome.folder));
   if (flags.json) {
     JsonLines::finish(outcome, report);
   } else if (!flags.quiet) {

@@ -28,6 +28,7 @@ struct SessionFlags {
   bool json = false;                  ///< JSON in place of the summary
   bool quiet = false;                 ///< no progress, no summary
   ReportOptions report;
+  std::string mcap_out;          ///< file; empty = none
   std::optional<int> live_port;  ///< of the live page; none = no such page
   std::string live_address = LivePage::Options{}.address;
   bool found_camera = false;  ///< run.camera was not named by the user; it may be of other images

@@ -164,4 +164,11 @@ bool decompress_zstd(Bytes compressed, std::size_t max_size, std::vector<unsigne
   return run<Zstd>(compressed, max_size, out);
 }
 
+std::vector<unsigned char> compress_zstd(Bytes bytes) {
+  constexpr int kFast = 1;
+  std::vector<unsigned char> frame(ZSTD_compressBound(bytes.size()));
+  frame.resize(ZSTD_compress(frame.data(), frame.size(), bytes.data(), bytes.size(), kFast));
+  return frame;
+}
+
 }  // namespace loopbit::recordings

@@ -30,4 +30,7 @@ bool is_zstd(Bytes bytes);
 /// As decompress(), of a zstd frame that holds up to `max_size` bytes.
 bool decompress_zstd(Bytes compressed, std::size_t max_size, std::vector<unsigned char>& out);
 
+/// The bytes as a zstd frame.
+std::vector<unsigned char> compress_zstd(Bytes bytes);
+
 }  // namespace loopbit::recordings

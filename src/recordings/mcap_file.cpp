@@ -1,35 +1,22 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-// The MCAP format, version 0: https://mcap.dev/spec
 #include <algorithm>
-#include <array>
 #include <map>
 #include <utility>
 
 #include <fmt/format.h>
-#include <zlib.h>
 
 #include "loopbit/error.hpp"
 
 #include "chunked_file.hpp"
 #include "compression.hpp"
+#include "mcap_format.hpp"
 
 namespace loopbit::recordings {
 namespace {
 
-constexpr std::array<unsigned char, 8> kMcapMagic = {0x89, 'M', 'C', 'A', 'P', '0', '\r', '\n'};
 constexpr std::uint64_t kHeadBytes = 9;     ///< opcode and length of a record
 constexpr std::uint64_t kFooterBytes = 20;  ///< content of that record
-
-enum class Opcode : std::uint8_t {
-  footer = 0x02,
-  schema = 0x03,
-  channel = 0x04,
-  message = 0x05,
-  chunk = 0x06,
-  statistics = 0x0B,
-  data_end = 0x0F,
-};
 
 struct Head {
   Opcode opcode;
@@ -45,10 +32,6 @@ Encoding encoding_of(const std::string& name) {
   if (name == "cdr") return Encoding::cdr;
   if (name == "ros1") return Encoding::ros1;
   return Encoding::other;
-}
-
-std::uint32_t checksum(Bytes bytes) {
-  return static_cast<std::uint32_t>(crc32_z(0, bytes.data(), bytes.size()));
 }
 
 /// The schemas and channels that were read so far. McapChannels stay where they are.

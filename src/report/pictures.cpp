@@ -9,7 +9,8 @@
 #include <numeric>
 #include <span>
 
-#include "base64.hpp"
+#include "loopbit/base64.hpp"
+
 
 namespace loopbit::report {
 namespace {

@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "loopbit/base64.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/evidence_file.hpp"
 #include "loopbit/growing_report.hpp"
@@ -23,7 +24,6 @@
 #include "loopbit/version.hpp"
 #include "loopbit/write_file.hpp"
 
-#include "base64.hpp"
 #include "pictures.hpp"
 #include "report_json.hpp"
 #include "report_page.hpp"
@@ -306,7 +306,7 @@ Json matrix_json(const EvidenceReader& evidence, const MatchList& list, int fram
   return {{"side", matrix.cells.rows},
           {"frames_per_cell", matrix.frames_per_cell},
           {"compared_every", matrix.compared_every},
-          {"png", report::base64(png)}};
+          {"png", base64(png)}};
 }
 
 bool is_same(const GroundTruth& a, const GroundTruth& b) {

@@ -37,7 +37,9 @@ function rounded(value: number): string {
   const size = Math.abs(value);
   if (size >= 1) return value.toFixed(size >= 100 ? 1 : 2).replace(/\.?0+$/, "");
   const shown = Number(value.toPrecision(4));
-  return String(Number.isInteger(shown) ? value : shown);
+  if (!Number.isInteger(shown)) return String(shown);
+  // Two digits of what is missing to 1.
+  return value.toFixed(Math.min(16, 1 - Math.floor(Math.log10(1 - size))));
 }
 
 /** About three significant digits, because steps take microseconds to seconds. */

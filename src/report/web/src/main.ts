@@ -47,10 +47,10 @@ function bar(live: HTMLElement | null, opener: HTMLElement): HTMLElement {
     "div",
     { class: "bar-top" },
     html("span", { class: "brand" }, "loopbit report"),
+    live,
     html(
       "span",
       { class: "tools" },
-      live,
       button({ id: "theme", "aria-label": "Light or dark" }, toggleScheme, "light / dark"),
       opener,
     ),

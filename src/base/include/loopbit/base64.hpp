@@ -5,9 +5,9 @@
 #include <span>
 #include <string>
 
-namespace loopbit::report {
+namespace loopbit {
 
 /// RFC 4648, with padding.
 std::string base64(std::span<const unsigned char> bytes);
 
-}  // namespace loopbit::report
+}  // namespace loopbit

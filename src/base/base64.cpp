@@ -1,13 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include "base64.hpp"
+#include "loopbit/base64.hpp"
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
 
-namespace loopbit::report {
+namespace loopbit {
 
 std::string base64(std::span<const unsigned char> bytes) {
   constexpr std::string_view kDigits =
@@ -25,4 +25,4 @@ std::string base64(std::span<const unsigned char> bytes) {
   return text;
 }
 
-}  // namespace loopbit::report
+}  // namespace loopbit

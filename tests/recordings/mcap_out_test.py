@@ -1,0 +1,123 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""The file of --mcap-out, read back by Foxglove's library. Run by run.sh."""
+
+import base64
+import csv
+import io
+import json
+import os
+import pathlib
+import resource
+import subprocess
+
+import pytest
+from PIL import Image
+
+from recordings_test import LOOPBIT, loopbit_command
+
+HERE = pathlib.Path(__file__).resolve().parent
+TOWN = ["--frames", "110", "--world", "laps=2", "--world", "spacing_m=2.1",
+        "--world", "width_px=320", "--world", "height_px=240"]
+
+
+def read_back(file):
+    ran = subprocess.run(["node", HERE / "read_mcap.mjs", os.environ["LOOPBIT_NODE_MODULES"], file],
+                         capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stderr
+    return json.loads(ran.stdout)
+
+
+def on(read, topic):
+    return [each["message"] for each in read["messages"] if each["topic"] == f"/loopbit/{topic}"]
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """A run in the built-in world, with poses, truth and times, and its MCAP file."""
+    folder = tmp_path_factory.mktemp("town")
+    loopbit_command("demo", *TOWN, "--out", folder / "run", "--mcap-out", folder / "out.mcap")
+    with open(folder / "run/loops.csv", newline="") as file:
+        return folder, read_back(folder / "out.mcap"), list(csv.DictReader(file))
+
+
+def test_detections_are_those_of_loops_csv(town):
+    _, read, rows = town
+    detections = on(read, "detection")
+    assert len(detections) == len(rows)
+    for detection, row in zip(detections, rows):
+        assert detection["status"] == row["status"]
+        assert detection["is_loop"] == (row["status"] == "loop")
+        assert detection["score"] == pytest.approx(float(row["score"]), abs=1e-6)
+        assert detection["inliers"] == int(row["inliers"])
+        assert str(detection.get("match", "")) == row["match"]
+    times = [int(each["time_ns"]) for each in read["messages"]]
+    assert times == sorted(times)
+
+
+def test_each_loop_is_a_line_between_its_places(town):
+    folder, read, rows = town
+    with open(folder / "run/positions.csv", newline="") as file:
+        places = {row["frame"]: [float(row[axis]) for axis in ("x_m", "y_m", "z_m")]
+                  for row in csv.DictReader(file)}
+    lines = {entity["id"]: entity["lines"][0]["points"] for scene in on(read, "scene")
+             for entity in scene["entities"] if entity["id"].startswith("loop ")}
+    loops = [row for row in rows if row["status"] == "loop"]
+    assert len(loops) > 20 and len(lines) == len(loops)
+    for row in loops:
+        ends = [[point[axis] for axis in "xyz"] for point in lines[f"loop {row['frame']}"]]
+        assert ends == [pytest.approx(places[row["frame"]]), pytest.approx(places[row["match"]])]
+    path = {entity["id"]: entity["lines"][0]["points"] for scene in on(read, "scene")
+            for entity in scene["entities"] if entity["id"].startswith("path ")}
+    # Stretches share their ends.
+    assert sum(map(len, path.values())) == len(rows) + len(path) - 1
+
+
+def test_pictures_are_the_frame_and_its_match(town):
+    _, read, rows = town
+    queries, matches = on(read, "query"), on(read, "match")
+    assert len(queries) == len(rows)
+    loops = [row for row in rows if row["status"] == "loop"]
+    assert [message["data"] for message in matches] == [
+        queries[int(row["match"])]["data"] for row in loops]
+    assert Image.open(io.BytesIO(base64.b64decode(queries[0]["data"]))).size == (256, 192)
+
+
+def test_without_pictures_and_poses(tmp_path):
+    loopbit_command("demo", *TOWN, "--write-images", tmp_path / "town")
+    loopbit_command("run", tmp_path / "town/images", "--limit", "30", "--out", tmp_path / "run",
+                    "--no-report", "--mcap-out", tmp_path / "out.mcap")
+    read = read_back(tmp_path / "out.mcap")
+    assert on(read, "query") == [] and len(on(read, "detection")) == 30
+    path = on(read, "scene")[-1]["entities"][0]["lines"][0]["points"]
+    assert len({(point["x"], point["y"]) for point in path}) == 30  # on a ring
+
+
+def test_full_disk_is_one_clear_error_and_keeps_the_earlier_file(tmp_path):
+    out = tmp_path / "out.mcap"
+    out.write_text("earlier")
+    limit = 400_000  # more than any other file of the run has
+    ran = subprocess.run(
+        [LOOPBIT, "demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", out, "--no-report"],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
+        capture_output=True, text=True)
+    del limit
+    assert ran.returncode == 4, ran.stderr
+    assert [line for line in ran.stderr.splitlines() if "Cannot write" in line] == [
+        f"loopbit: Cannot write '{out}': File too large; check the folder, its permissions and the "
+        "free space."]
+    assert out.read_text() == "earlier"
+    assert list(tmp_path.glob("*.part")) == []
+
+
+def test_impossible_files_are_refused_before_the_run(tmp_path):
+    recording = tmp_path / "drive.mcap"
+    recording.write_bytes(b"\x89MCAP0\r\n")
+    for arguments, code, text in [
+            (["run", recording, "--mcap-out", recording], 2, "is the input"),
+            (["demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", tmp_path / "none/out.mcap"], 4,
+             "No such file or directory"),
+            (["demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", tmp_path], 4, "Is a directory")]:
+        ran = loopbit_command(*arguments, code=code)
+        assert text in ran.stderr
+    assert not (tmp_path / "run").exists()
