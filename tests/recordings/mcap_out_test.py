@@ -111,10 +111,10 @@ def test_full_disk_is_one_clear_error_and_keeps_the_earlier_file(tmp_path):
 
 
 def test_impossible_files_are_refused_before_the_run(tmp_path):
-    recording = tmp_path / "drive.mcap"
-    recording.write_bytes(b"\x89MCAP0\r\n")
+    images = tmp_path / "images.txt"
+    images.write_text("1.png\n")
     for arguments, code, text in [
-            (["run", recording, "--mcap-out", recording], 2, "is the input"),
+            (["run", images, "--mcap-out", images], 2, "is the input"),
             (["demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", tmp_path / "none/out.mcap"], 4,
              "No such file or directory"),
             (["demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", tmp_path], 4, "Is a directory")]:
