@@ -77,10 +77,11 @@ const shows = (page, frames) =>
 
 /** The page shows the finished report, and its numbers are those of run.json. */
 async function checkFinished(page, folder) {
-  await page.waitForFunction(() => {
-    const data = document.getElementById("report-data");
-    return data !== null && JSON.parse(data.textContent).live === undefined;
-  });
+  await page.waitForFunction(
+    () =>
+      performance.getEntriesByName("report-drawn").length > 0 &&
+      document.querySelector("[data-key=live]") === null,
+  );
   await drawn(page);
   await checkNumbers(page, JSON.parse(readFileSync(path.join(folder, "run.json"), "utf8")));
 }
