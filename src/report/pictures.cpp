@@ -11,7 +11,6 @@
 
 #include "loopbit/base64.hpp"
 
-
 namespace loopbit::report {
 namespace {
 
