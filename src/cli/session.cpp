@@ -53,6 +53,15 @@ void check_mcap_out(const SessionFlags& flags, const std::string& input) {
   if (!fs::is_directory(file.parent_path(), error)) throw cannot_write(flags.mcap_out, ENOENT);
 }
 
+/// Of --live, which needs no port, so that an input after it would be taken for one.
+CLI::Validator port() {
+  const auto check = [](std::string& text) {
+    const std::string fault = whole_number(0, 65535)(text);
+    return fault.empty() ? fault : fault + "; write INPUT before --live";
+  };
+  return {check, ""};
+}
+
 /// Null without --live.
 std::unique_ptr<LivePage> open_live_page(const SessionFlags& flags) {
   if (!flags.live_port) return nullptr;
@@ -133,7 +142,7 @@ void SessionFlags::add_to(CLI::App& command) {
           ->type_name("[PORT]")
           ->expected(0, 1)
           ->default_str(std::to_string(kLivePort))
-          ->check(whole_number(0, 65535))
+          ->check(port())
           ->excludes(left_out);
   command
       .add_option(

@@ -172,6 +172,14 @@ async function checkCommand(browser, given, images, scratch) {
   const second = spawnSync(given.loopbit, ["run", list, "--live", port], { encoding: "utf8" });
   assert.equal(second.status, 2);
   assert.match(second.stderr, new RegExp(`cannot be served on 127.0.0.1 port ${port} \\(`));
+  const swallowed = spawnSync(given.loopbit, ["run", "--live", list, "--json"], {
+    encoding: "utf8",
+  });
+  assert.equal(swallowed.status, 2);
+  assert.match(
+    swallowed.stderr,
+    /is not a whole number from 0 to 65535; write INPUT before --live/,
+  );
   const viewer = await visit(browser, url);
   await shows(viewer.page, 20);
   run.child.kill("SIGINT");
