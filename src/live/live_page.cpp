@@ -44,7 +44,7 @@ constexpr auto kPatience = 3s;
 /// For viewers to ask for the finished page.
 constexpr auto kFarewell = 3s;
 /// The evidence of more of the latest frames than may not be in the file yet.
-constexpr std::size_t kLatest = 2 * kFramesPerTransaction;
+constexpr std::size_t kLatest = std::size_t{2} * kFramesPerTransaction;
 
 constexpr const char* kHtml = "text/html; charset=utf-8";
 constexpr const char* kJson = "application/json";
@@ -379,7 +379,7 @@ LivePage::~LivePage() = default;
 
 const std::string& LivePage::url() const { return impl_->url(); }
 
-RunListener LivePage::beside(RunListener listener) {
+RunListener LivePage::beside(const RunListener& listener) {
   RunListener both = listener;
   GrowingRun& run = impl_->run();
   both.on_start = [&run, listener](const std::string& folder) {

@@ -148,8 +148,7 @@ Json detection_json(const Detection& detection, double threshold, std::uint64_t 
 /// Writes the messages of one frame after the other.
 class Export {
  public:
-  Export(const std::string& path, const FinishedRun& run)
-      : run_(run), places_(places_of(run)), file_(path) {
+  Export(const std::string& path, const FinishedRun& run) : places_(places_of(run)), file_(path) {
     if (run.truth) judge_.emplace(*run.truth, run.scoring().evaluation);
     if (!run.evidence_path.empty()) evidence_.emplace(run.evidence_path);
     if (run.record) threshold_ = run.record->options.decision.min_score;
@@ -224,7 +223,6 @@ class Export {
     return places_[static_cast<std::size_t>(frame)];
   }
 
-  const FinishedRun& run_;
   std::vector<Place> places_;
   recordings::McapWriter file_;
   std::optional<Judge> judge_;

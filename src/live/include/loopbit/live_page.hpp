@@ -37,7 +37,7 @@ class LivePage {
   [[nodiscard]] const std::string& url() const;
 
   /// `listener`, and this page beside it. The page must outlive the result.
-  [[nodiscard]] RunListener beside(RunListener listener);
+  [[nodiscard]] RunListener beside(const RunListener& listener);
 
   /// Gives every viewer the finished page, `report`, in place of the growing one. Returns when they
   /// have it, after some seconds at most; nothing is served any more. Throws Error (kind input) if
