@@ -93,21 +93,27 @@ def test_without_pictures_and_poses(tmp_path):
     assert len({(point["x"], point["y"]) for point in path}) == 30  # on a ring
 
 
-def test_full_disk_is_one_clear_error_and_keeps_the_earlier_file(tmp_path):
-    out = tmp_path / "out.mcap"
-    out.write_text("earlier")
-    limit = 400_000  # more than any other file of the run has
-    ran = subprocess.run(
-        [LOOPBIT, "demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", out, "--no-report"],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000)),
-        capture_output=True, text=True)
-    del limit
+@pytest.mark.parametrize("out", ["/dev/full", "out.mcap"])
+def test_full_disk_is_one_clear_error_and_keeps_the_earlier_file(out, tmp_path):
+    out = tmp_path / out
+    is_device = out == pathlib.Path("/dev/full")
+    if not is_device:
+        out.write_text("earlier")
+
+    def limit_files():
+        if not is_device:  # to more than any other file of the run has
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    ran = subprocess.run([LOOPBIT, "demo", *TOWN, "--out", tmp_path / "run", "--no-report",
+                          "--mcap-out", out],
+                         preexec_fn=limit_files, capture_output=True, text=True)
     assert ran.returncode == 4, ran.stderr
+    reason = "No space left on device" if is_device else "File too large"
     assert [line for line in ran.stderr.splitlines() if "Cannot write" in line] == [
-        f"loopbit: Cannot write '{out}': File too large; check the folder, its permissions and the "
-        "free space."]
-    assert out.read_text() == "earlier"
-    assert list(tmp_path.glob("*.part")) == []
+        f"loopbit: Cannot write '{out}': {reason}; check the folder, its permissions and the free space."]
+    if not is_device:
+        assert out.read_text() == "earlier"
+    assert list(out.parent.glob("*.part")) == []
 
 
 def test_impossible_files_are_refused_before_the_run(tmp_path):
