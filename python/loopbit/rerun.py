@@ -1,12 +1,14 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Shows a run in Rerun; needs `pip install loopbit[rerun]`::
+"""Shows a run in Rerun::
 
     import rerun
     import loopbit.rerun
 
     rerun.init("loopbit", spawn=True)
     loopbit.rerun.log(loopbit.read_run("town_loops"))
+
+Needs Rerun's SDK: ``pip install loopbit[rerun]``.
 """
 
 from __future__ import annotations

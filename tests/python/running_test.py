@@ -199,7 +199,8 @@ RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views":
            "truth_variable": "variable", "poses": "positions_m", "no_report": "evidence"}
 OF_OPTIONS = {"preset", "config", "set"}
 OF_SOURCE = {"every", "limit", "max_megapixels", "topic"}
-OF_THE_COMMAND = {"help", "threads", "pictures_mb", "open", "json", "quiet", "no_poses"}
+OF_THE_COMMAND = {"help", "threads", "pictures_mb", "open", "json", "quiet", "no_poses", "live",
+                  "live_address", "mcap_out"}
 
 
 def test_run_folder_has_what_the_command_has(command):
