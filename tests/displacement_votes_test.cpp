@@ -35,11 +35,13 @@ Features scattered(int count, std::uint32_t seed) {
 std::vector<Match> nearest(const Features& query, const Features& place) {
   FirstLook look;
   Verifier().match_strongest(query, place, look);
-  return nearest_matches(query, place, look);
+  return DisplacementVotes(10.0).nearest_matches(query, place, look);
 }
 
 int votes(const Features& query, const Features& place) {
-  return displacement_votes(query, place, nearest(query, place), 10.0);
+  FirstLook look;
+  Verifier().match_strongest(query, place, look);
+  return DisplacementVotes(10.0).count(query, place, look);
 }
 
 TEST(NearestMatches, NeedNoRatioButAreOneToOne) {

@@ -7,8 +7,6 @@
 #include <numeric>
 #include <utility>
 
-#include "displacement_votes.hpp"
-
 namespace loopbit {
 namespace {
 
@@ -24,6 +22,9 @@ constexpr double kMinWorthInRichView = 0.5;
 constexpr int kMinSightingInliers = 8;
 /// Fewer matches of what a promising candidate has are chance, and hardly change its distinctness.
 constexpr std::size_t kMinSharedMatches = 4;
+/// A candidate with fewer matches in the first look has no more than chance in all: half of the
+/// keypoints of either image make a quarter of the pairs, and 8 matches are chance.
+constexpr std::size_t kMinFirstMatches = 3;
 /// Of the places where the robot is expected, so many are looked at closer.
 constexpr std::size_t kExpectedCloserLooks = 4;
 
@@ -69,7 +70,8 @@ CandidateVerifier::CandidateVerifier(const LoopDetectorOptions& options, Places 
       places_(std::move(places)),
       known_loops_(known_loops),
       verifier_(options.verification),
-      thorough_verifier_(thorough(options.verification)) {}
+      thorough_verifier_(thorough(options.verification)),
+      votes_(options.verification.min_spacing_scales) {}
 
 std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
                                                          const std::vector<Candidate>& candidates,
@@ -104,8 +106,7 @@ void CandidateVerifier::look(Frame& frame) {
     VerifiedCandidate& v = frame.verified[i];
     const Features& place = places_.features(v.candidate.place);
     verifier.match_strongest(query, place, looks_[i]);
-    v.votes = displacement_votes(query, place, nearest_matches(query, place, looks_[i]),
-                                 options_.verification.min_spacing_scales);
+    v.votes = votes_.count(query, place, looks_[i]);
   }
 }
 
@@ -119,7 +120,10 @@ void CandidateVerifier::look_closer(Frame& frame, std::size_t first, std::size_t
     return looks_[a].matches.size() > looks_[b].matches.size();
   });
   order.resize(std::min(order.size(), most));
-  for (const std::size_t i : order) verify_in_full(frame, i, false);
+  for (const std::size_t i : order) {
+    if (looks_[i].matches.size() < kMinFirstMatches) return;
+    verify_in_full(frame, i, false);
+  }
 }
 
 /// Verifies those that may have elsewhere what a promising candidate has.

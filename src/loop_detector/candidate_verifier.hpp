@@ -11,6 +11,7 @@
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/verification.hpp"
 
+#include "displacement_votes.hpp"
 #include "distinctness.hpp"
 #include "known_loops.hpp"
 
@@ -32,7 +33,7 @@ struct CandidateGeometry {
 struct VerifiedCandidate {
   Candidate candidate;
   std::ptrdiff_t step = 0;  ///< the candidate's position along the path, see RecentView::step_of
-  int votes = 0;            ///< see displacement_votes()
+  int votes = 0;            ///< see DisplacementVotes
   std::optional<CandidateGeometry> geometry = std::nullopt;  ///< if it may be more than chance
 };
 
@@ -95,6 +96,7 @@ class CandidateVerifier {
   const KnownLoops& known_loops_;
   Verifier verifier_;
   Verifier thorough_verifier_;  ///< its first look matches all keypoints
+  DisplacementVotes votes_;
   std::vector<FirstLook> looks_;
   std::vector<Verification> verifications_;
   Verification verification_;

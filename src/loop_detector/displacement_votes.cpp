@@ -4,10 +4,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstdint>
-#include <optional>
-#include <tuple>
+#include <limits>
 
 namespace loopbit {
 namespace {
@@ -17,106 +14,108 @@ constexpr float kMaxScaleRatio = 2.0F;
 /// Displacements up to the whole image either way; a square of four bins is a tenth of its width.
 constexpr int kBinsPerWidth = 20;
 constexpr int kBins = 2 * kBinsPerWidth + 2;
+/// Bins are numbered row by row, with one more at the end of each row, which stays empty.
+constexpr int kBinStride = kBins + 1;
+constexpr std::int16_t kNoBin = -1;
 
-struct Bin {
-  int x = 0;
-  int y = 0;
-};
+using Bins = std::array<std::int16_t, std::size_t{kBins} * kBinStride>;
 
-std::optional<Bin> bin_of(const Keypoint& a, const Keypoint& b, float bin_px) {
-  if (a.scale > kMaxScaleRatio * b.scale || b.scale > kMaxScaleRatio * a.scale) return std::nullopt;
-  const Bin bin{static_cast<int>(std::floor((a.x_px - b.x_px) / bin_px)) + kBins / 2,
-                static_cast<int>(std::floor((a.y_px - b.y_px) / bin_px)) + kBins / 2};
-  const auto is_in = [](int i) { return 0 <= i && i < kBins; };
-  return is_in(bin.x) && is_in(bin.y) ? std::optional(bin) : std::nullopt;
+/// std::floor() is a call where the processor's own instruction may be missing.
+int floor_of(float value) {
+  const int whole = static_cast<int>(value);
+  return whole - (value < static_cast<float>(whole) ? 1 : 0);
 }
 
-/// How many displacements fall into each square of four bins, by its upper left bin.
-using Squares = std::array<std::array<int, kBins>, kBins>;
-
-/// Calls visit(x, y) for the squares that have `bin`.
-template <typename Visit>
-void for_each_square(const Bin& bin, const Visit& visit) {
-  for (int y = std::max(0, bin.y - 1); y <= std::min(bin.y, kBins - 2); ++y) {
-    for (int x = std::max(0, bin.x - 1); x <= std::min(bin.x, kBins - 2); ++x) visit(x, y);
-  }
+std::int16_t bin_of(const Keypoint& a, const Keypoint& b, float bin_px) {
+  if (a.scale > kMaxScaleRatio * b.scale || b.scale > kMaxScaleRatio * a.scale) return kNoBin;
+  const int x = floor_of((a.x_px - b.x_px) / bin_px) + kBins / 2;
+  const int y = floor_of((a.y_px - b.y_px) / bin_px) + kBins / 2;
+  const bool is_in = 0 <= x && x < kBins && 0 <= y && y < kBins;
+  return is_in ? static_cast<std::int16_t>(y * kBinStride + x) : kNoBin;
 }
 
-/// The square with most displacements; of equals the first one, row by row.
-Bin fullest_square(const std::vector<std::optional<Bin>>& bins) {
-  Squares counts{};
-  const auto count = [&](int x, int y) -> int& {
-    return counts[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
-  };
-  Bin best;
-  int most = 0;
-  for (const auto& bin : bins) {
-    if (!bin) continue;
-    for_each_square(*bin, [&](int x, int y) { most = std::max(most, ++count(x, y)); });
+/// The upper left bin of the square of four with most displacements; of equals the first one.
+std::int16_t fullest_square(const std::vector<std::int16_t>& bins) {
+  Bins displacements{};
+  for (const std::int16_t bin : bins) {
+    if (bin != kNoBin) ++displacements[static_cast<std::size_t>(bin)];
   }
-  bool is_found = false;
-  for (const auto& bin : bins) {
-    if (!bin) continue;
-    for_each_square(*bin, [&](int x, int y) {
-      if (count(x, y) < most || (is_found && std::tie(best.y, best.x) <= std::tie(y, x))) return;
-      best = {x, y};
-      is_found = true;
-    });
+  constexpr std::size_t kSquares = Bins{}.size() - kBinStride - 1;
+  Bins squares;  // NOLINT(cppcoreguidelines-pro-type-member-init): written next
+  std::int16_t most = 0;
+  for (std::size_t i = 0; i < kSquares; ++i) {
+    squares[i] = static_cast<std::int16_t>(displacements[i] + displacements[i + 1] +
+                                           displacements[i + kBinStride] +
+                                           displacements[i + kBinStride + 1]);
+    most = std::max(most, squares[i]);
   }
-  return best;
+  const auto* fullest = std::find(squares.begin(), squares.begin() + kSquares, most);
+  return static_cast<std::int16_t>(fullest - squares.begin());
+}
+
+bool is_in_square(std::int16_t bin, std::int16_t square) {
+  const int offset = bin - square;
+  return offset == 0 || offset == 1 || offset == kBinStride || offset == kBinStride + 1;
+}
+
+const Keypoint& keypoint(const Features& features, int index) {
+  return features.keypoints[static_cast<std::size_t>(index)];
 }
 
 }  // namespace
 
-std::vector<Match> nearest_matches(const Features& query, const Features& place,
-                                   const FirstLook& look) {
-  std::vector<Match> best(place.keypoints.size(), Match{-1, -1});
-  std::vector<std::int32_t> distances_sq(place.keypoints.size());
-  const auto offer = [&](const FirstLook::Group& group, std::size_t first_query,
-                         std::size_t first_place) {
-    for (std::size_t i = 0; i < group.nearest.size(); ++i) {
-      const FirstLook::Neighbours& found = group.nearest[i];
-      const std::size_t at = first_place + static_cast<std::size_t>(found.index);
-      if (best[at].query >= 0 && found.distance_sq >= distances_sq[at]) continue;
-      best[at] = {static_cast<int>(first_query + i), static_cast<int>(at)};
-      distances_sq[at] = found.distance_sq;
+void DisplacementVotes::append_nearest(const FirstLook::Group& group, std::size_t first_query,
+                                       std::size_t first_place) {
+  if (group.num_query == 0) return;
+  nearest_.assign(group.num_place, {std::numeric_limits<std::int32_t>::max(), -1});
+  for (std::size_t i = 0; i < group.nearest.size(); ++i) {
+    const FirstLook::Neighbours& found = group.nearest[i];
+    Nearest& known = nearest_[static_cast<std::size_t>(found.index)];
+    if (found.distance_sq < known.distance_sq) {
+      known = {found.distance_sq, static_cast<std::int32_t>(i)};
     }
-  };
-  if (look.dark.num_query > 0) offer(look.dark, 0, 0);
-  if (look.bright.num_query > 0) offer(look.bright, query.num_dark, place.num_dark);
-  std::vector<Match> by_query(query.keypoints.size(), Match{-1, -1});
-  for (const Match& match : best) {
-    if (match.query >= 0) by_query[static_cast<std::size_t>(match.query)] = match;
   }
-  std::erase_if(by_query, [](const Match& match) { return match.query < 0; });
-  return by_query;
+  for (std::size_t i = 0; i < group.nearest.size(); ++i) {
+    const auto at = static_cast<std::size_t>(group.nearest[i].index);
+    if (nearest_[at].query != static_cast<std::int32_t>(i)) continue;
+    matches_.push_back({static_cast<int>(first_query + i), static_cast<int>(first_place + at)});
+  }
 }
 
-int displacement_votes(const Features& query, const Features& place,
-                       const std::vector<Match>& matches, double min_spacing_scales) {
-  const auto key = [](const Features& f, int i) -> const Keypoint& {
-    return f.keypoints[static_cast<std::size_t>(i)];
-  };
+const std::vector<Match>& DisplacementVotes::nearest_matches(const Features& query,
+                                                             const Features& place,
+                                                             const FirstLook& look) {
+  matches_.clear();
+  append_nearest(look.dark, 0, 0);
+  append_nearest(look.bright, query.num_dark, place.num_dark);
+  return matches_;
+}
+
+void DisplacementVotes::find_bins(const Features& query, const Features& place) {
   const float bin_px = static_cast<float>(query.working_size_px.width) / kBinsPerWidth;
-  std::vector<std::optional<Bin>> bins;
-  bins.reserve(matches.size());
-  for (const Match& match : matches) {
-    bins.push_back(bin_of(key(query, match.query), key(place, match.place), bin_px));
-  }
-  const Bin square = fullest_square(bins);
-  std::vector<Keypoint> counted;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    const Keypoint& here = key(query, matches[i].query);
-    const auto& bin = bins[i];
-    const auto is_in = [](int at, int first) { return first <= at && at <= first + 1; };
-    if (!bin || !is_in(bin->x, square.x) || !is_in(bin->y, square.y)) continue;
-    const bool is_new = std::none_of(counted.begin(), counted.end(), [&](const Keypoint& other) {
-      const auto spacing = min_spacing_scales * std::min(here.scale, other.scale);
-      return std::hypot(here.x_px - other.x_px, here.y_px - other.y_px) < spacing;
+  bins_.resize(matches_.size());
+  std::transform(matches_.begin(), matches_.end(), bins_.begin(), [&](const Match& match) {
+    return bin_of(keypoint(query, match.query), keypoint(place, match.place), bin_px);
+  });
+}
+
+int DisplacementVotes::count(const Features& query, const Features& place, const FirstLook& look) {
+  nearest_matches(query, place, look);
+  find_bins(query, place);
+  const std::int16_t square = fullest_square(bins_);
+  counted_.clear();
+  for (std::size_t i = 0; i < matches_.size(); ++i) {
+    if (bins_[i] == kNoBin || !is_in_square(bins_[i], square)) continue;
+    const Keypoint& here = keypoint(query, matches_[i].query);
+    const bool is_new = std::none_of(counted_.begin(), counted_.end(), [&](const Keypoint& other) {
+      const double dx = here.x_px - other.x_px;
+      const double dy = here.y_px - other.y_px;
+      const double spacing = min_spacing_scales_ * std::min(here.scale, other.scale);
+      return dx * dx + dy * dy < spacing * spacing;
     });
-    if (is_new) counted.push_back(here);
+    if (is_new) counted_.push_back(here);
   }
-  return static_cast<int>(counted.size());
+  return static_cast<int>(counted_.size());
 }
 
 }  // namespace loopbit

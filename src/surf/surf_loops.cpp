@@ -28,22 +28,46 @@ void linear_row(const LinearRow& from, std::size_t count, std::uint16_t* __restr
   }
 }
 
+/// A register of any instruction set.
+using FourSums = std::uint32_t __attribute__((vector_size(16)));
+
+FourSums load_sums(const std::uint32_t* sums) {
+  FourSums four;
+  __builtin_memcpy(&four, sums, sizeof four);
+  return four;
+}
+
+/// Each of four numbers and all before it.
+FourSums running(FourSums four) {
+  constexpr FourSums kZeros = {};
+  four += __builtin_shufflevector(kZeros, four, 0, 4, 5, 6);
+  return four + __builtin_shufflevector(kZeros, four, 0, 1, 4, 5);
+}
+
 /// Row `y` of the integral image from `pixels` and the running sums of each column.
 void integral_row(const std::uint8_t* __restrict pixels, std::size_t width,
                   std::uint32_t* __restrict column_sums, std::uint32_t* __restrict even,
                   std::uint32_t* __restrict odd) {
   for (std::size_t x = 0; x < width; ++x) column_sums[x] += pixels[x];
-  // Of the sums, only those at even columns wait for each other.
-  const std::size_t pairs = width / 2;
-  for (std::size_t i = 0; i < pairs; ++i) odd[i] = column_sums[2 * i] + column_sums[2 * i + 1];
-  std::uint32_t sum = 0;
-  for (std::size_t i = 0; i < pairs; ++i) {
-    even[i] = sum;
-    sum += odd[i];
+  FourSums before = {};  // the sum of all columns before, four times
+  std::size_t i = 0;
+  for (; 2 * i + 8 <= width; i += 4) {
+    const FourSums first = load_sums(column_sums + 2 * i);
+    const FourSums last = load_sums(column_sums + 2 * i + 4);
+    const FourSums even_columns = __builtin_shufflevector(first, last, 0, 2, 4, 6);
+    const FourSums pairs = even_columns + __builtin_shufflevector(first, last, 1, 3, 5, 7);
+    const FourSums after_pairs = before + running(pairs);
+    const FourSums at_even = after_pairs - pairs;
+    const FourSums at_odd = at_even + even_columns;
+    __builtin_memcpy(even + i, &at_even, sizeof at_even);
+    __builtin_memcpy(odd + i, &at_odd, sizeof at_odd);
+    before = __builtin_shufflevector(after_pairs, after_pairs, 3, 3, 3, 3);
   }
-  even[pairs] = sum;
-  for (std::size_t i = 0; i < pairs; ++i) odd[i] = even[i] + column_sums[2 * i];
-  if (width % 2 != 0) odd[pairs] = sum + column_sums[width - 1];
+  std::uint32_t sum = before[0];
+  for (std::size_t x = 2 * i; x <= width; ++x) {
+    (x % 2 == 0 ? even : odd)[x / 2] = sum;
+    sum += x < width ? column_sums[x] : 0;
+  }
 }
 
 /// Loops over samples go in blocks of 16, whole vectors of every width; what lies after the last
@@ -210,12 +234,15 @@ constexpr std::size_t kLines = 32;
 
 struct Lines {
   Lines(float center_px, float scale, std::int32_t size) {
-    for (std::size_t i = 0; i < kLines; ++i) {
+    const auto end = static_cast<float>(size);
+    for (std::int32_t i = 0; i < static_cast<std::int32_t>(kLines); ++i) {
       // The middle of pixel 0 lies between corners 0 and 1; + 0.5 again rounds.
-      const float cells = static_cast<float>(i < kPatchCells ? i : kPatchCells) - 10.5F;
-      const float at = center_px + cells * scale + 1.0F;
-      const auto end = static_cast<float>(size);
-      corners[i] = static_cast<std::int32_t>(at < 0.0F ? 0.0F : (at > end ? end : at));
+      constexpr auto kLast = static_cast<std::int32_t>(kPatchCells);
+      const float cells = static_cast<float>(i < kLast ? i : kLast) - 10.5F;
+      float at = center_px + cells * scale + 1.0F;
+      at = at < end ? at : end;
+      at = at > 0.0F ? at : 0.0F;
+      corners[i] = static_cast<std::int32_t>(at);
     }
     for (std::size_t i = 0; i + 1 < kLines; ++i) {
       const std::int32_t length = corners[i + 1] - corners[i];
@@ -258,47 +285,113 @@ constexpr std::size_t kBinWidth = 5;
 constexpr std::size_t kBinReach = 7;
 constexpr float kBinWeights[kBinReach] = {4.0F / 7, 4.0F / 6, 4.0F / 5, 1.0F,
                                           4.0F / 5, 4.0F / 6, 4.0F / 7};
-/// Samples in memory: rows of 20 in whole vectors, the rest padding.
-constexpr std::size_t kSampleStride = 32;
-/// Sums of dx, dy, |dx|, |dy|, a row of each.
-using SampleSums = float[4][kSampleStride];
+/// Samples in memory, as cells: rows of 20 in whole vectors of 8, the rest padding.
+constexpr std::size_t kSampleStride = kCellStride;
+/// A row of samples or bins before the first and one after the last, which are 0.
+constexpr std::size_t kSampleRows = kSamples + 2;
+/// Rows of bins, for each of which there are 4 kinds of sums: of dx, dy, |dx|, |dy|.
+constexpr std::size_t kBinRows = 4;
+constexpr std::size_t kSums = kBinRows * 4;
 
-/// Adds one row of samples at `weight`.
-void add_samples(const float* __restrict upper, const float* __restrict lower, float weight,
-                 SampleSums& sums) {
-  for (std::size_t k = 0; k < kSampleStride; ++k) {
-    const float dx = (upper[k + 1] + lower[k + 1]) - (upper[k] + lower[k]);
-    const float dy = (lower[k] + lower[k + 1]) - (upper[k] + upper[k + 1]);
-    sums[0][k] += weight * dx;
-    sums[1][k] += weight * dy;
-    sums[2][k] += weight * __builtin_fabsf(dx);
-    sums[3][k] += weight * __builtin_fabsf(dy);
+/// A register of any instruction set.
+using Four = float __attribute__((vector_size(16)));
+
+template <std::size_t Size>
+void clear(float (&values)[Size]) {
+  static_assert(Size % 4 == 0);
+  constexpr Four kZeros = {};
+  for (std::size_t i = 0; i < Size; i += 4) {
+    __builtin_memcpy(values + i, &kZeros, sizeof kZeros);
+    // A loop that a compiler takes for memset() becomes a slow instruction.
+    asm("" : : : "memory");
   }
 }
 
-/// One value of each kind: a register of any instruction set, which compilers leave as it is.
-using Kinds = float __attribute__((vector_size(16)));
+/// Gradients of each row of samples.
+struct Samples {
+  alignas(64) float dx[kSampleRows][kSampleStride];
+  alignas(64) float dy[kSampleRows][kSampleStride];
+};
 
-/// The 4 bins of each kind in a row of samples: bin x of kind k is bins[4 k + x].
-void add_bins(const SampleSums& sums, float* __restrict bins) {
-  // After a sample of padding, into which the first bin reaches.
-  alignas(Kinds) float samples[kSamples + 2][4] = {};
-  for (std::size_t k = 0; k < kSamples; ++k) {
-    for (std::size_t kind = 0; kind < 4; ++kind) samples[k + 1][kind] = sums[kind][k];
-  }
-  alignas(Kinds) float columns[4][4];
-  for (std::size_t bin = 0; bin < 4; ++bin) {
-    Kinds sum = {};
-    for (std::size_t k = 0; k < kBinReach; ++k) {
-      Kinds sample;
-      __builtin_memcpy(&sample, samples[bin * kBinWidth + k], sizeof sample);
-      sum += kBinWeights[k] * sample;
+void find_samples(const float* __restrict cells, Samples& samples) {
+  clear(samples.dx[0]);
+  clear(samples.dy[0]);
+  clear(samples.dx[kSampleRows - 1]);
+  clear(samples.dy[kSampleRows - 1]);
+  for (std::size_t y = 0; y < kSamples; ++y) {
+    const float* upper = cells + y * kCellStride;
+    const float* lower = upper + kCellStride;
+    for (std::size_t k = 0; k < kSampleStride; ++k) {
+      samples.dx[y + 1][k] = (upper[k + 1] + lower[k + 1]) - (upper[k] + lower[k]);
+      samples.dy[y + 1][k] = (lower[k] + lower[k + 1]) - (upper[k] + upper[k + 1]);
     }
-    __builtin_memcpy(columns[bin], &sum, sizeof sum);
   }
-  for (std::size_t kind = 0; kind < 4; ++kind) {
-    for (std::size_t bin = 0; bin < 4; ++bin) bins[4 * kind + bin] = columns[bin][kind];
+}
+
+/// Sums down the columns of samples for each row of bins.
+void add_rows(const Samples& samples, float (&sums)[kSums][kSampleStride]) {
+  for (std::size_t bin = 0; bin < kBinRows; ++bin) {
+    const float(*dx)[kSampleStride] = samples.dx + bin * kBinWidth;
+    const float(*dy)[kSampleStride] = samples.dy + bin * kBinWidth;
+    for (std::size_t k = 0; k < kSampleStride; ++k) {
+      float sum[4] = {};
+#pragma GCC unroll 7
+      for (std::size_t i = 0; i < kBinReach; ++i) {
+        sum[0] += kBinWeights[i] * dx[i][k];
+        sum[1] += kBinWeights[i] * dy[i][k];
+        sum[2] += kBinWeights[i] * __builtin_fabsf(dx[i][k]);
+        sum[3] += kBinWeights[i] * __builtin_fabsf(dy[i][k]);
+      }
+      for (std::size_t kind = 0; kind < 4; ++kind) sums[4 * bin + kind][k] = sum[kind];
+    }
   }
+}
+
+Four load_four(const float* values) {
+  Four four;
+  __builtin_memcpy(&four, values, sizeof four);
+  return four;
+}
+
+/// Of 4 x 4 values, each a row of `from` or `to`.
+void transpose(const float* from, std::size_t from_stride, float* to, std::size_t to_stride) {
+  const Four a = load_four(from);
+  const Four b = load_four(from + from_stride);
+  const Four c = load_four(from + 2 * from_stride);
+  const Four d = load_four(from + 3 * from_stride);
+  const Four low_ab = __builtin_shufflevector(a, b, 0, 4, 1, 5);
+  const Four high_ab = __builtin_shufflevector(a, b, 2, 6, 3, 7);
+  const Four low_cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+  const Four high_cd = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+  const Four rows[4] = {__builtin_shufflevector(low_ab, low_cd, 0, 1, 4, 5),
+                        __builtin_shufflevector(low_ab, low_cd, 2, 3, 6, 7),
+                        __builtin_shufflevector(high_ab, high_cd, 0, 1, 4, 5),
+                        __builtin_shufflevector(high_ab, high_cd, 2, 3, 6, 7)};
+  for (std::size_t i = 0; i < 4; ++i)
+    __builtin_memcpy(to + i * to_stride, rows + i, sizeof rows[i]);
+}
+
+/// Sums along the rows: bin x of sum i is bins[4 i + x].
+void add_columns(const float (&sums)[kSums][kSampleStride], float* __restrict bins) {
+  alignas(64) float samples[kSampleRows][kSums];
+  clear(samples[0]);
+  clear(samples[kSampleRows - 1]);
+  for (std::size_t k = 0; k < kSamples; k += 4) {
+    for (std::size_t i = 0; i < kSums; i += 4) {
+      transpose(sums[i] + k, kSampleStride, samples[k + 1] + i, kSums);
+    }
+  }
+  alignas(64) float columns[4][kSums];
+  for (std::size_t bin = 0; bin < 4; ++bin) {
+    const float(*first)[kSums] = samples + bin * kBinWidth;
+    for (std::size_t i = 0; i < kSums; ++i) {
+      float sum = 0.0F;
+#pragma GCC unroll 7
+      for (std::size_t k = 0; k < kBinReach; ++k) sum += kBinWeights[k] * first[k][i];
+      columns[bin][i] = sum;
+    }
+  }
+  for (std::size_t i = 0; i < kSums; i += 4) transpose(columns[0] + i, kSums, bins + 4 * i, 4);
 }
 
 void quantize(const float* values, std::int8_t* descriptor) {
@@ -320,16 +413,12 @@ void quantize(const float* values, std::int8_t* descriptor) {
 }
 
 void describe(const float* cells, std::int8_t* descriptor) {
+  Samples samples;
+  find_samples(cells, samples);
+  alignas(64) float sums[kSums][kSampleStride];
+  add_rows(samples, sums);
   float values[kDescriptorSize];
-  for (std::size_t bin_y = 0; bin_y < 4; ++bin_y) {
-    SampleSums sums = {};
-    for (std::size_t i = 0; i < kBinReach; ++i) {
-      const std::size_t y = bin_y * kBinWidth + i;  // one too many, as the first bin reaches -1
-      if (y == 0 || y > kSamples) continue;
-      add_samples(cells + (y - 1) * kCellStride, cells + y * kCellStride, kBinWeights[i], sums);
-    }
-    add_bins(sums, values + bin_y * 16);
-  }
+  add_columns(sums, values);
   quantize(values, descriptor);
 }
 

@@ -69,6 +69,18 @@ Groups strongest_of(const Features& features, std::size_t strongest) {
   return {all.first(dark), all.subspan(features.num_dark, kept - dark)};
 }
 
+/// Whether a first look compared all features that match() compares.
+bool is_complete(const FirstLook& look, const Features& query, const Features& place) {
+  const auto is_whole = [](const FirstLook::Group& group, std::size_t num_query,
+                           std::size_t num_place) {
+    return num_query == 0 || num_place == 0 ||
+           (group.num_query == num_query && group.num_place == num_place);
+  };
+  return is_whole(look.dark, query.num_dark, place.num_dark) &&
+         is_whole(look.bright, query.descriptors.size() - query.num_dark,
+                  place.descriptors.size() - place.num_dark);
+}
+
 }  // namespace
 
 void FeatureMatcher::find_constants(Descriptors descriptors) {
@@ -177,6 +189,10 @@ void FeatureMatcher::match(const Features& query, const Features& place, double 
 
 void FeatureMatcher::match(const Features& query, const Features& place, double max_ratio,
                            const FirstLook& look, std::vector<Match>& matches) {
+  if (is_complete(look, query, place)) {
+    matches = look.matches;
+    return;
+  }
   const Groups of_query = strongest_of(query, query.descriptors.size());
   const Groups of_place = strongest_of(place, place.descriptors.size());
   match_rest(of_query.dark, of_place.dark, max_ratio, look.dark);
