@@ -53,6 +53,42 @@ def world_command(settings):
     return command
 
 
+def command_of(build):
+    """The path of the command; builds it first if `build` is a revision."""
+    if os.access(build, os.X_OK) and pathlib.Path(build).is_file():
+        return pathlib.Path(build).resolve()
+    return build_revision(build, "loopbit_cli", "src/cli/loopbit")
+
+
+def build_revision(revision, target, program, prepare=lambda tree: None):
+    """The path of a program of an earlier revision, built where it is not yet. prepare(tree) may
+    change the tree before."""
+    commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--verify", "--quiet",
+                             f"{revision}^{{commit}}"], capture_output=True, text=True).stdout.strip()
+    if not commit:
+        sys.exit(f"{revision} is neither a program nor a revision.")
+    tree = ROOT / "build/revisions" / commit
+    built = tree / "build/release" / program
+    if not built.exists():
+        print(f"building {revision} in {tree}", file=sys.stderr)
+        tree.mkdir(parents=True, exist_ok=True)
+        archive = subprocess.run(["git", "-C", ROOT, "archive", commit], check=True,
+                                 capture_output=True).stdout
+        subprocess.run(["tar", "-x", "-C", tree], input=archive, check=True)
+        prepare(tree)
+        call("cmake", "--preset", "release", "--log-level=WARNING", cwd=tree)
+        call("cmake", "--build", "--preset", "release", "--target", target, "--parallel",
+             str(os.cpu_count()), cwd=tree)
+    return built
+
+
+def call(*command, cwd=None):
+    done = subprocess.run(command, cwd=cwd, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{' '.join(map(str, command))}\n{done.stdout}")
+
+
 class Runner:
     """Runs `loopbit` with one thread; keeps its folders in `scratch`."""
 

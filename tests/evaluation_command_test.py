@@ -347,13 +347,11 @@ class EvaluationCommandTest(CommandTest):
         run = self.scratch / "run"
         run.mkdir()
         header, *lines = (self.reference / "loops.csv").read_text().splitlines()
-        at = header.split(",").index("name")
         loop = next(row for row in rows(self.reference) if row["status"] == "loop")
         for name in ("a b.png", "a\\x2cb.png", ""):
             with self.subTest(name):
-                cells = [line.split(",") for line in lines]
-                cells[int(loop["match"])][at] = name
-                changed = [",".join(row) for row in cells]
+                changed = [",".join([*cells[:8], name if cells[0] == loop["match"] else cells[8], *cells[9:]])
+                           for cells in (line.split(",") for line in lines)]
                 (run / "loops.csv").write_text("\n".join([header, *changed, ""]))
                 self.assert_fails(loopbit("pairs", run), 3, f"Frame {loop['match']}", f"'{name}'")
 

@@ -86,7 +86,7 @@ struct Neighbours {
 /// Of kMatchLanes descriptors among `others`.
 Neighbours nearest_two(InstructionSet set, const std::int8_t* descriptors,
                        const std::int8_t* others, std::size_t num_others) {
-  std::vector<std::int32_t> constants(num_others + 1);
+  std::vector<std::int32_t> constants(kMatchConstants * num_others + 1);
   kernels_for<MatchKernels>(set).describe_constants(others, num_others, constants.data());
   NearestTwo nearest;
   kernels_for<MatchKernels>(set).nearest_two(descriptors, others, constants.data(), num_others,

@@ -128,14 +128,14 @@ TEST(PlaceFilter, InliersNeedNoPath) {
   const auto update = robot.see({{100, {.votes = 40, .inliers = 60}}});
   EXPECT_GT(update.probability, 0.98);
   EXPECT_EQ(matched_step(update), 100);
-  EXPECT_GT(update.observed[*update.match].geometry, 5);
+  EXPECT_GT(update.observed[*update.match].terms.geometry, 5);
 }
 
 TEST(PlaceFilter, ChanceInliersAreNoEvidence) {
   const Robot robot;
   const auto update = robot.look({{100, {.votes = 4, .inliers = 8}}});
   EXPECT_EQ(update.observed.back().step, 100);
-  EXPECT_EQ(update.observed.back().geometry, 0);
+  EXPECT_EQ(update.observed.back().terms.geometry, 0);
 }
 
 TEST(PlaceFilter, StandingStillAddsNothing) {
@@ -210,7 +210,7 @@ TEST(PlaceFilter, TooFewCandidatesTellNothingOfVotes) {
   few.num_similar = 7;
   const auto none = few.follow(100, 1, 15, {.votes = 60});
   EXPECT_FALSE(none.has_null);
-  for (const auto& o : none.observed) EXPECT_EQ(o.votes, 0);
+  for (const auto& o : none.observed) EXPECT_EQ(o.terms.votes, 0);
   EXPECT_LT(none.revisit, 0.01);
   Robot enough;
   enough.num_similar = 8;
@@ -222,15 +222,15 @@ TEST(PlaceFilter, TooFewCandidatesTellNothingOfVotes) {
 TEST(PlaceFilter, MapsFullOfLookAlikesDemandMoreInliers) {
   const FoundAt found{{100, {.votes = 4, .inliers = 25}}};
   Robot robot;
-  const double before = robot.look(found).observed.back().geometry;
+  const double before = robot.look(found).observed.back().terms.geometry;
   for (int i = 0; i < 60; ++i) robot.see({{130 + 13 * (i * 7 % 60), {.votes = 4, .inliers = 14}}});
-  const double after = robot.look(found).observed.back().geometry;
+  const double after = robot.look(found).observed.back().terms.geometry;
   EXPECT_GT(before, 0);
   EXPECT_LT(after, before - 1);
   // And where wrong places never have more than chance, fewer will do.
   Robot clear;
   for (int i = 0; i < 60; ++i) clear.see({{130 + 13 * (i * 7 % 60), {.votes = 4, .inliers = 6}}});
-  EXPECT_GT(clear.look(found).observed.back().geometry, before);
+  EXPECT_GT(clear.look(found).observed.back().terms.geometry, before);
 }
 
 TEST(PlaceFilter, GeometryOfASmallMapSaysLess) {
@@ -239,7 +239,7 @@ TEST(PlaceFilter, GeometryOfASmallMapSaysLess) {
     return robot.filter
         .update({}, {candidate(5, {.votes = 40, .inliers = 40})}, 1, steps, {}, robot.may_be_at)
         .observed.front()
-        .geometry;
+        .terms.geometry;
   };
   EXPECT_LT(term_among(5), term_among(20));
   EXPECT_LT(term_among(20), term_among(200));
@@ -261,41 +261,6 @@ TEST(PlaceFilter, WithdrawForgetsThePathAndItsLaps) {
     }
     EXPECT_LT(mass(left), 0.05);
   }
-}
-
-double score_of(const ScoreTerms& terms) { return 1 / (1 + std::exp(-terms.sum())); }
-
-TEST(PlaceFilter, TermsAddUpToTheLogOddsOfTheScore) {
-  Robot robot;
-  robot.loops.add(400, 100);
-  for (int i = 0; i < 30; ++i) {
-    // A path with a rival at times, inliers at times, and frames that speak against it.
-    FoundAt found{{100 + i, i % 7 == 5 ? Found{.votes = 0} : kByNight}};
-    if (i % 5 == 4) found[2000] = {.votes = 20};
-    if (i % 4 == 3) found[100 + i].inliers = 14;
-    const auto update = robot.see(found);
-    ASSERT_TRUE(update.match) << i;
-    EXPECT_NEAR(score_of(update.terms), update.probability, 1e-8) << i;
-    EXPECT_LE(update.terms.rivals, 0) << i;
-    const auto& match = update.observed[*update.match];
-    EXPECT_NEAR(update.terms.votes + update.terms.geometry, match.log_likelihood_ratio(), 1e-8);
-    EXPECT_NEAR(update.terms.prior, std::log(0.01 / kSteps), 1e-8);
-  }
-}
-
-TEST(PlaceFilter, TermsNameWhatSpeaksForAMatch) {
-  Robot alone;
-  const auto by_inliers = alone.see({{100, {.votes = 4, .inliers = 60}}});
-  EXPECT_GT(by_inliers.terms.geometry, 10);
-  EXPECT_NEAR(by_inliers.terms.path, 0, 0.1) << "no frame before speaks for it";
-  EXPECT_NEAR(by_inliers.terms.rivals, 0, 0.1);
-  Robot night;
-  night.follow(100, 1, 12, kByNight);
-  const auto by_path = night.see({{112, kByNight}});
-  EXPECT_GT(by_path.terms.path, 5);
-  EXPECT_EQ(by_path.terms.geometry, 0);
-  const auto shared = Robot().look({{100, kByDay}, {3000, kByDay}});
-  EXPECT_LT(shared.terms.rivals, -1) << "another place shows as much";
 }
 
 TEST(PlaceFilter, ExcludedStepsHaveNoProbability) {

@@ -45,7 +45,6 @@ TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
               .status = Status::loop,
               .match = 0,
               .score = 20.5,
-              .terms = ScoreTerms{2.5, 1, 8.0625, -0.5, -9.25},
               .similarity = 0.25,
               .matches = 30,
               .inliers = 21,
@@ -54,16 +53,10 @@ TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
   EXPECT_EQ(lines_of(path("run/loops.csv")),
             (std::vector<std::string>{
                 kLoopsHeader,
-                "0,12.500000,no_earlier_place,,0,0.000000,0,0,,,,,,0.png,,0.000,0.000,0.000,0.000",
-                R"(1,,loop,0,20.5,0.250000,30,21,2.500,1.000,8.062,-0.500,-9.250,)"
-                R"(left\x2c \x22new\x22\x0a/1.png,0.png,)"
+                "0,12.500000,no_earlier_place,,0,0.000000,0,0,0.png,,0.000,0.000,0.000,0.000",
+                R"(1,,loop,0,20.5,0.250000,30,21,left\x2c \x22new\x22\x0a/1.png,0.png,)"
                 "1.000,0.500,12.250,3.000"}));
-  const auto read = read_detections(path("run/loops.csv"));
-  EXPECT_EQ(read[0].name, "0.png");
-  EXPECT_FALSE(read[0].terms);
-  ASSERT_TRUE(read[1].terms);
-  EXPECT_EQ(read[1].terms->rivals, -0.5);
-  EXPECT_EQ(read[1].terms->prior, -9.25);
+  EXPECT_EQ(read_detections(path("run/loops.csv"))[0].name, "0.png");
   EXPECT_EQ(read_match_list(path("run/loops.csv")).matches.size(), 1U);
 }
 
@@ -257,16 +250,15 @@ TEST_F(RunFolderTest, AChangedRowIsNamed) {
     test::expect_error(ErrorKind::input, {file, "line 2", part},
                        [&] { (void)read_detections(file); });
   };
-  expect_refused("0,,loop,0,1,0,0,0,,,,,,,,0,0,0", "18 columns");
-  expect_refused("0,,maybe,0,1,0,0,0,,,,,,,,0,0,0,0", "'maybe'");
-  expect_refused("0,,loop,x,1,0,0,0,,,,,,,,0,0,0,0", "'x'");
-  expect_refused("1,,loop,0,1,0,0,0,,,,,,,,0,0,0,0", "'1'");
-  expect_refused("0,,loop,-7,1,0,0,0,,,,,,,,0,0,0,0", "'-7'");
-  expect_refused("0,,loop,0,nan,0,0,0,,,,,,,,0,0,0,0", "'nan'");
-  expect_refused("0,,loop,0,1,inf,0,0,,,,,,,,0,0,0,0", "'inf'");
-  expect_refused("0,,loop,0,1,0,0,0,1,,2,3,4,,,0,0,0,0", "''");
+  expect_refused("0,,loop,0,1,0,0,0,,,0,0,0", "13 columns");
+  expect_refused("0,,maybe,0,1,0,0,0,,,0,0,0,0", "'maybe'");
+  expect_refused("0,,loop,x,1,0,0,0,,,0,0,0,0", "'x'");
+  expect_refused("1,,loop,0,1,0,0,0,,,0,0,0,0", "'1'");
+  expect_refused("0,,loop,-7,1,0,0,0,,,0,0,0,0", "'-7'");
+  expect_refused("0,,loop,0,nan,0,0,0,,,0,0,0,0", "'nan'");
+  expect_refused("0,,loop,0,1,inf,0,0,,,0,0,0,0", "'inf'");
   const std::string carried =
-      write("loops.csv", std::string(kLoopsHeader) + "\r\n0,,loop,0,1,0,0,0,,,,,,,,0,0,0,0\r\n");
+      write("loops.csv", std::string(kLoopsHeader) + "\r\n0,,loop,0,1,0,0,0,,,0,0,0,0\r\n");
   EXPECT_EQ(read_detections(carried).size(), 1U);
   test::expect_error(ErrorKind::input, {path("none"), "loops.csv"},
                      [&] { (void)read_run(path("none")); });

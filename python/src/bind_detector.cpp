@@ -104,25 +104,6 @@ void bind_detection(py::module_& module) {
             "verification_ms={:.3f})",
             t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
       });
-  py::class_<ScoreTerms>(
-      module, "ScoreTerms",
-      "The terms of the log odds of a match, in nats. With their sum S the score "
-      "is 1 / (1 + exp(-S)).")
-      .def_readonly("votes", &ScoreTerms::votes,
-                    "Features of frame and match that moved alike, against other places.")
-      .def_readonly("geometry", &ScoreTerms::geometry,
-                    "Distinct inliers, against those of wrong places.")
-      .def_readonly("path", &ScoreTerms::path,
-                    "The frames before, and the steps beside the match in this frame.")
-      .def_readonly("rivals", &ScoreTerms::rivals,
-                    "Places elsewhere that share the evidence; never above 0.")
-      .def_readonly("prior", &ScoreTerms::prior,
-                    "That a robot returns to this place of all; never above 0.")
-      .def("__repr__", [](const ScoreTerms& t) {
-        return fmt::format(
-            "ScoreTerms(votes={:.2f}, geometry={:.2f}, path={:.2f}, rivals={:.2f}, prior={:.2f})",
-            t.votes, t.geometry, t.path, t.rivals, t.prior);
-      });
   py::class_<Detection>(module, "Detection",
                         "The result for one frame, with the numbers behind the decision.")
       .def_readonly("frame", &Detection::frame, "Number of the frame, from 0.")
@@ -138,9 +119,6 @@ void bind_detection(py::module_& module) {
           "score", &Detection::score,
           "The probability that the match is right, 0 to 1; a loop from decision.min_score. "
           "The number of matches with decision.count_matches.")
-      .def_readonly("terms", &Detection::terms,
-                    "The terms of the score's log odds; None without a match or with "
-                    "decision.count_matches.")
       .def_readonly("similarity", &Detection::similarity, "xi of frame and match.")
       .def_readonly("matches", &Detection::matches, "Number of one-to-one feature matches.")
       .def_readonly("inliers", &Detection::inliers,

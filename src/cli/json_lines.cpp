@@ -36,13 +36,6 @@ void JsonLines::add(const Detection& detection) {
                              {"frame", detection.earlier_match->frame}};
   }
   line["score"] = detection.score;
-  if (const auto& terms = detection.terms) {
-    line["terms"] = {{"votes", terms->votes},
-                     {"geometry", terms->geometry},
-                     {"path", terms->path},
-                     {"rivals", terms->rivals},
-                     {"prior", terms->prior}};
-  }
   line["similarity"] = detection.similarity;
   line["matches"] = detection.matches;
   line["inliers"] = detection.inliers;

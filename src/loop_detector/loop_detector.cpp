@@ -506,7 +506,6 @@ class LoopDetector::Impl {
     if (!seen.update.match) return;
     report_match(seen.verified[*seen.update.match], seen, detection);
     detection.score = seen.update.probability;
-    detection.terms = seen.update.terms;
     detection.status = seen.update.probability >= decision.min_score ? Status::loop
                        : seen.update.revisit >= decision.min_score
                            ? Status::ambiguous

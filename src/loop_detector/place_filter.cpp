@@ -182,93 +182,46 @@ std::optional<std::size_t> best_of(const std::vector<PlaceFilter::Observed>& obs
   return best;
 }
 
-/// What the filter knows of where the robot is after a frame.
-struct Posterior {
-  const std::vector<PlaceFilter::Hypothesis>& places;
-  double elsewhere = 0;  ///< the rest of the probability, even where it is very small
-};
-
-/// Log odds of one that becomes `exp(log_ratio)` times as probable, for log_ratio <= 0.
-double less_probable(double log_odds, double log_ratio) {
-  return log_odds + log_ratio - std::log1p(-std::expm1(log_ratio) * std::exp(log_odds));
-}
-
-/// The terms of a match, of which all but the path are known, so that they add up to `log_odds`.
-ScoreTerms with_path(ScoreTerms terms, double log_odds) {
-  terms.path = 0;
-  terms.path = log_odds - terms.sum();
-  for (double* term : {&terms.votes, &terms.geometry, &terms.path, &terms.rivals, &terms.prior}) {
-    *term = rounded(*term);
-  }
-  return terms;
-}
-
-/// Of a match near the likeliest step: all hypotheses around it and on laps through the same place
-/// count for it.
-double log_odds_near(std::ptrdiff_t middle, const Posterior& posterior, const KnownLoops& loops,
-                     ScoreTerms& terms) {
-  double here = 0;
-  double others = posterior.elsewhere;
-  for (const PlaceFilter::Hypothesis& h : posterior.places) {
-    (is_near(h.step, middle, loops) ? here : others) += h.probability();
-  }
-  terms.rivals = std::log(posterior.elsewhere / others);
-  return std::log(here / others);
-}
-
-/// Of a match for which no path speaks: it is as probable as after a return from somewhere new.
-double log_odds_from_anywhere(const Posterior& posterior, const ScoreTerms& terms) {
-  double revisit = 0;
-  for (const PlaceFilter::Hypothesis& h : posterior.places) revisit += h.probability();
-  const double log_odds = terms.sum();
-  return revisit > 0 ? std::min(log_odds, std::log(revisit / posterior.elsewhere)) : log_odds;
-}
-
-/// Of all steps, one to which the robot returns.
-double from_anywhere(std::ptrdiff_t num_steps) {
-  return kReturn / static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps));
-}
-
-/// Which candidate is the match. `middle`: the likeliest step, if there is one.
-std::optional<std::size_t> choose_match(std::optional<std::ptrdiff_t> middle,
-                                        std::ptrdiff_t num_steps, const KnownLoops& loops,
-                                        const PlaceFilter::Update& update) {
+/// Which candidate is the match, and how probable: all hypotheses around the likeliest step and on
+/// laps through the same place count for it.
+void choose_match(std::ptrdiff_t num_steps, const KnownLoops& loops, PlaceFilter::Update& update) {
   using Observed = PlaceFilter::Observed;
-  const auto any = [](const Observed& /*o*/) { return true; };
   const auto ratio = [](const Observed& o) { return o.log_likelihood_ratio(); };
-  if (!middle) return best_of(update.observed, any, ratio);
-  // A place elsewhere that shows so much by itself that it needs no path shares the view, from
-  // closer.
-  const auto best = best_of(update.observed, any, [&](const Observed& o) {
-    return ratio(o) + std::log(std::max(update.prior.at(o.step), from_anywhere(num_steps) / 2));
-  });
-  if (!best || !is_near(update.observed[*best].step, *middle, loops)) return best;
-  const auto match = best_of(
+  update.revisit = 1 - update.belief.elsewhere();
+  const auto middle = peak(update.belief);
+  if (!middle) {
+    update.match = best_of(
+        update.observed, [](const Observed& /*o*/) { return true; }, ratio);
+    return;
+  }
+  for (const PlaceFilter::Hypothesis& h : update.belief.places) {
+    if (is_near(h.step, *middle, loops)) update.probability += h.probability();
+  }
+  update.match = best_of(
       update.observed, [&](const Observed& o) { return std::abs(o.step - *middle) <= kMatchSteps; },
       [&](const Observed& o) {
         // One place may show more than the next by chance.
         const auto at = [&](std::ptrdiff_t step) { return update.belief.at(step); };
         return at(o.step) + (at(o.step - 1) + at(o.step + 1)) / 2;
       });
-  if (match) return match;
-  return best_of(
-      update.observed, [&](const Observed& o) { return is_near(o.step, *middle, loops); }, ratio);
-}
-
-/// Why the match is as probable as it is.
-ScoreTerms explain(std::optional<std::ptrdiff_t> middle, const Posterior& posterior,
-                   std::ptrdiff_t num_steps, const KnownLoops& loops,
-                   const PlaceFilter::Observed& match) {
-  const double ratio = match.log_likelihood_ratio();
-  ScoreTerms terms{.votes = match.votes,
-                   .geometry = ratio - match.votes,
-                   .prior = std::log(from_anywhere(num_steps))};
-  double log_odds = middle && is_near(match.step, *middle, loops)
-                        ? log_odds_near(*middle, posterior, loops, terms)
-                        : log_odds_from_anywhere(posterior, terms);
-  // A path may end at any frame: one that speaks against its match is no loop.
-  if (ratio < 0) log_odds = less_probable(log_odds, ratio);
-  return with_path(terms, log_odds);
+  if (!update.match) {
+    update.match = best_of(
+        update.observed, [&](const Observed& o) { return is_near(o.step, *middle, loops); }, ratio);
+  }
+  // A place elsewhere that shows so much by itself that it needs no path shares the view, from
+  // closer.
+  const double from_anywhere =
+      kReturn / (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
+  const auto best = best_of(
+      update.observed, [](const Observed& /*o*/) { return true; },
+      [&](const Observed& o) {
+        return ratio(o) + std::log(std::max(update.prior.at(o.step), from_anywhere));
+      });
+  if (!best || is_near(update.observed[*best].step, *middle, loops)) return;
+  // No path speaks for it, so it is as probable as after a return from somewhere new.
+  const double odds = 2 * from_anywhere * std::exp(ratio(update.observed[*best]));
+  update.probability = std::min(update.revisit, odds / (1 + odds));
+  update.match = best;
 }
 
 }  // namespace
@@ -285,7 +238,7 @@ double PlaceFilter::Belief::at(std::ptrdiff_t step) const {
 }
 
 double PlaceFilter::Observed::log_likelihood_ratio() const {
-  return rounded(std::min(kMaxLogRatio, votes + geometry));
+  return rounded(std::min(kMaxLogRatio, terms.votes + terms.geometry));
 }
 
 PlaceFilter::Belief PlaceFilter::predict(bool is_step) const {
@@ -376,10 +329,10 @@ std::vector<PlaceFilter::Observed> PlaceFilter::observe(
   observed.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
     Observed o{.step = verified[i].step, .sigmas = sigmas[i]};
-    if (num_similar >= kMinNull) o.votes = votes_log_ratio(sigmas[i], num_similar);
+    if (num_similar >= kMinNull) o.terms.votes = votes_log_ratio(sigmas[i], num_similar);
     if (verified[i].geometry) {
       o.evidence = verified[i].geometry->evidence();
-      o.geometry = geometry_log_ratio(o.evidence, num_steps);
+      o.terms.geometry = geometry_log_ratio(o.evidence, num_steps);
     }
     observed.push_back(o);
   }
@@ -412,21 +365,17 @@ PlaceFilter::Update PlaceFilter::update(
     h.forward /= sum;
     h.backward /= sum;
   }
-  double elsewhere = prior.elsewhere() / sum;
-  std::erase_if(update.belief.places, [&](const Hypothesis& h) {
-    const bool is_dropped = h.probability() < kMinProbability;
-    if (is_dropped) elsewhere += h.probability();
-    return is_dropped;
-  });
+  std::erase_if(update.belief.places,
+                [](const Hypothesis& h) { return h.probability() < kMinProbability; });
   update.prior = std::move(prior);
-  const auto middle = peak(update.belief);
-  update.match = choose_match(middle, num_steps, loops, update);
+  choose_match(num_steps, loops, update);
+  // A path may end at any frame: one that speaks against its match is no loop.
   if (update.match) {
-    update.terms = explain(middle, {update.belief.places, elsewhere}, num_steps, loops,
-                           update.observed[*update.match]);
-    update.probability = rounded(1 / (1 + std::exp(-update.terms.sum())));
+    const double ratio = update.observed[*update.match].log_likelihood_ratio();
+    update.probability *= std::min(1.0, std::exp(ratio));
   }
-  update.revisit = rounded(1 - update.belief.elsewhere());
+  update.probability = rounded(update.probability);
+  update.revisit = rounded(update.revisit);
   return update;
 }
 

@@ -9,8 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "loopbit/detection.hpp"
-
 #include "candidate_verifier.hpp"
 #include "known_loops.hpp"
 
@@ -47,11 +45,16 @@ class PlaceFilter {
     [[nodiscard]] double at(std::ptrdiff_t step) const;
   };
 
+  /// The terms of the log likelihood ratio of a candidate, in nats.
+  struct Terms {
+    double votes = 0;     ///< log likelihood ratio of its displacement votes
+    double geometry = 0;  ///< the same of its inliers
+  };
+
   /// A candidate of the frame, as the filter sees it.
   struct Observed {
     std::ptrdiff_t step = 0;
-    double votes = 0;     ///< log likelihood ratio of its displacement votes
-    double geometry = 0;  ///< the same of its inliers
+    Terms terms = {};
     double sigmas = 0;    ///< votes in standard deviations of the null; 0 where there is no null
     double evidence = 0;  ///< CandidateGeometry::evidence, 0 if it was not looked at closer
 
@@ -66,8 +69,7 @@ class PlaceFilter {
     /// Index of the candidate that shows the same place best, if any was observed there.
     std::optional<std::size_t> match;
     bool has_null = false;   ///< there were places enough to tell what votes mean
-    ScoreTerms terms;        ///< of the log odds that the match is right, if there is one
-    double probability = 0;  ///< the same as a probability
+    double probability = 0;  ///< that the match is right
     double revisit = 0;      ///< that any match is right
   };
 

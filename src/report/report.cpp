@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string_view>
@@ -188,20 +187,6 @@ Json earlier_matches(const std::vector<Detection>& detections) {
   });
 }
 
-/// Null where a frame has none; shown with one decimal.
-Json terms_columns(const std::vector<Detection>& detections) {
-  const auto term = [&](double ScoreTerms::*member) {
-    return column(detections, [&](const Detection& d) {
-      return d.terms ? Json(std::round(*d.terms.*member * 100) / 100) : Json();
-    });
-  };
-  return {{"votes", term(&ScoreTerms::votes)},
-          {"geometry", term(&ScoreTerms::geometry)},
-          {"path", term(&ScoreTerms::path)},
-          {"rivals", term(&ScoreTerms::rivals)},
-          {"prior", term(&ScoreTerms::prior)}};
-}
-
 /// The columns of loops.csv that lists of other detectors lack.
 void add_own_columns(Json& json, const std::vector<Detection>& detections) {
   const auto time = [&](double StepTimes::*step) {
@@ -214,7 +199,6 @@ void add_own_columns(Json& json, const std::vector<Detection>& detections) {
       column(detections, [](const Detection& d) { return static_cast<int>(d.status); });
   json["earlier_match"] = earlier_matches(detections);
   json["score"] = column(detections, [](const Detection& d) { return d.score; });
-  json["terms"] = terms_columns(detections);
   json["similarity"] = column(detections, [](const Detection& d) { return d.similarity; });
   json["matches"] = column(detections, [](const Detection& d) { return d.matches; });
   json["inliers"] = column(detections, [](const Detection& d) { return d.inliers; });
@@ -243,8 +227,7 @@ void add_match_columns(Json& json, const MatchList& list, int frames) {
     json["match"].push_back(match ? match->match : -1);
     json["score"].push_back(match ? Json(match->score) : Json());
   }
-  for (const char* name :
-       {"earlier_match", "terms", "similarity", "matches", "inliers", "times_ms"}) {
+  for (const char* name : {"earlier_match", "similarity", "matches", "inliers", "times_ms"}) {
     json[name] = nullptr;
   }
 }

@@ -124,32 +124,21 @@ void read_match(const Row& row, std::size_t column, Detection& detection) {
                              .frame = row.number_in<int>(cell.substr(colon + 1), column)};
 }
 
-/// All of them or none.
-std::optional<ScoreTerms> terms_from(const Row& row, std::size_t column) {
-  if (row.cell(column).empty()) return std::nullopt;
-  return ScoreTerms{.votes = row.number<double>(column),
-                    .geometry = row.number<double>(column + 1),
-                    .path = row.number<double>(column + 2),
-                    .rivals = row.number<double>(column + 3),
-                    .prior = row.number<double>(column + 4)};
-}
-
 Detection detection_from(const Row& row) {
-  constexpr std::size_t kColumns = 19;
+  constexpr std::size_t kColumns = 14;
   row.check_columns(kColumns);
   Detection detection{.frame = row.number<PlaceId>(0),
                       .timestamp_s = row.number_if_any<double>(1),
                       .status = status_from(row, 2),
                       .score = row.number<double>(4),
-                      .terms = terms_from(row, 8),
                       .similarity = row.number<double>(5),
                       .matches = row.number<int>(6),
                       .inliers = row.number<int>(7),
-                      .times = {.content_ms = row.number<double>(15),
-                                .retrieval_ms = row.number<double>(16),
-                                .features_ms = row.number<double>(17),
-                                .verification_ms = row.number<double>(18)},
-                      .name = std::string(row.cell(13))};
+                      .times = {.content_ms = row.number<double>(10),
+                                .retrieval_ms = row.number<double>(11),
+                                .features_ms = row.number<double>(12),
+                                .verification_ms = row.number<double>(13)},
+                      .name = std::string(row.cell(8))};
   read_match(row, 3, detection);
   return detection;
 }

@@ -39,22 +39,16 @@ std::string name_cell(const std::string& name) {
   return cell;
 }
 
-std::string terms_cells(const std::optional<ScoreTerms>& terms) {
-  if (!terms) return ",,,,";
-  return fmt::format("{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}", terms->votes, terms->geometry,
-                     terms->path, terms->rivals, terms->prior);
-}
-
 /// `before`: the detections of the frames before it.
 std::string csv_row(const Detection& d, const std::vector<Detection>& before) {
   const StepTimes& t = d.times;
   const auto match = static_cast<std::size_t>(d.match.value_or(d.frame));
   const std::string match_name = match < before.size() ? before[match].name : "";
-  return fmt::format("{},{},{},{},{},{:.6f},{},{},{},{},{},{:.3f},{:.3f},{:.3f},{:.3f}\n", d.frame,
+  return fmt::format("{},{},{},{},{},{:.6f},{},{},{},{},{:.3f},{:.3f},{:.3f},{:.3f}\n", d.frame,
                      d.timestamp_s ? fmt::format("{:.6f}", *d.timestamp_s) : "",
                      to_string(d.status), match_cell(d), d.score, d.similarity, d.matches,
-                     d.inliers, terms_cells(d.terms), name_cell(d.name), name_cell(match_name),
-                     t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
+                     d.inliers, name_cell(d.name), name_cell(match_name), t.content_ms,
+                     t.retrieval_ms, t.features_ms, t.verification_ms);
 }
 
 std::string frame_list(const char* comment, const std::vector<int>& frames) {

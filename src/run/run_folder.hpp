@@ -71,8 +71,7 @@ class RunFolder {
 
 /// The header of loops.csv, without a line end.
 inline constexpr const char* kLoopsHeader =
-    "frame,timestamp,status,match,score,similarity,matches,inliers,"
-    "votes,geometry,path,rivals,prior,name,match_name,"
+    "frame,timestamp,status,match,score,similarity,matches,inliers,name,match_name,"
     "content_ms,retrieval_ms,features_ms,verification_ms";
 
 /// The header of positions.csv, without a line end.

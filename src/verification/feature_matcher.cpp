@@ -84,7 +84,7 @@ bool is_complete(const FirstLook& look, const Features& query, const Features& p
 }  // namespace
 
 void FeatureMatcher::find_constants(Descriptors descriptors) {
-  constants_.resize(descriptors.size());
+  constants_.resize(kMatchConstants * descriptors.size());
   kernels_.describe_constants(descriptors.front().data(), descriptors.size(), constants_.data());
 }
 

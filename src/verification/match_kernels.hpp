@@ -13,6 +13,9 @@ namespace loopbit {
 /// Descriptors whose neighbours are sought at once.
 inline constexpr std::size_t kMatchLanes = 16;
 
+/// Numbers that a kernel may keep of each descriptor.
+inline constexpr std::size_t kMatchConstants = 3;
+
 /// The neighbours of kMatchLanes descriptors by squared distance; of equals, the first is nearest.
 struct NearestTwo {
   static constexpr std::int32_t kNone = 0x7fffffff;
@@ -27,11 +30,12 @@ struct MatchKernels {
   template <InstructionSet>
   static const MatchKernels& compiled_for();
 
-  /// constants[i] = what nearest_two of the same table has to know of the i-th descriptor.
+  /// Finds what nearest_two of the same table has to know of these descriptors. `constants` has
+  /// room for kMatchConstants * num_descriptors.
   void (*describe_constants)(const std::int8_t* descriptors, std::size_t num_descriptors,
                              std::int32_t* constants);
 
-  /// The nearest and second nearest of `others` for each of 16 descriptors. `constants` belong to
+  /// The nearest and second nearest of `others` for each of 16 descriptors. `constants` are of all
   /// `others`. Cost: 16 * num_others products of 64 values.
   void (*nearest_two)(const std::int8_t* descriptors, const std::int8_t* others,
                       const std::int32_t* constants, std::size_t num_others, NearestTwo& nearest);

@@ -283,25 +283,6 @@ const misdrawn = () => {
   return [...stretched, ...outside];
 };
 
-/** The terms are those of the frame, and their sum is the log odds of its score. */
-async function checkTerms(page, run, frame) {
-  const terms = ["votes", "geometry", "path", "rivals", "prior"].map((n) => run.terms?.[n][frame]);
-  const shown = page.locator("[data-key='pair.terms']");
-  if (terms.some((term) => typeof term !== "number")) {
-    assert.equal(await shown.count(), 0, `terms of ${frame}`);
-    return;
-  }
-  const text = (await textOf(page, "pair.terms")).replaceAll("−", "-");
-  const numbers = text.replaceAll("- ", "-").match(/-?[a-z]* ?-?\d+\.\d/g);
-  const values = numbers.map((word) => Number(word.replace(/[a-z ]/g, "")));
-  const sum = terms.reduce((a, b) => a + b, 0);
-  [sum, ...terms].forEach((value, i) => {
-    assert.ok(Math.abs(values[i] - value) <= 0.0501, `term ${i} of ${frame}: ${text}`);
-  });
-  const score = 1 / (1 + Math.exp(-sum));
-  assert.ok(Math.abs(score - run.score[frame]) < 0.01, `terms of ${frame}: ${text}`);
-}
-
 /** Of some pairs all that the pair browser says; of fewer, if `isBrief`. */
 export async function checkPairs(page, isBrief) {
   const run = (await embedded(page)).runs[0];
@@ -324,7 +305,6 @@ export async function checkPairs(page, isBrief) {
       if (run[name])
         assertShows(await textOf(page, `pair.${name}`), run[name][frame], `${name} of ${frame}`);
     }
-    await checkTerms(page, run, frame);
     const pictures = [run.pictures[frame], run.pictures[match]];
     const shown = await page.$$eval(
       "#pair .picture img",

@@ -106,19 +106,6 @@ function detect(places, quality, options, next) {
   return columns;
 }
 
-/** Terms whose sum is the log odds of the score. */
-function termsOf({ match, score }) {
-  const of = (term) => score.map((value, i) => (match[i] < 0 ? null : round(term(value), 2)));
-  const logOdds = (value) => Math.log(Math.max(value, 1e-6) / Math.max(1 - value, 1e-6));
-  return {
-    votes: of((value) => 0.4 * logOdds(value)),
-    geometry: of((value) => 0.6 * logOdds(value) + 3),
-    path: of(() => 7),
-    rivals: of(() => -0.5),
-    prior: of(() => -9.5),
-  };
-}
-
 /** The later half of the run is in a place that an earlier session of the map knows. */
 function sendElsewhere(columns) {
   columns.earlier_match = columns.match.map(() => null);
@@ -415,7 +402,6 @@ function runOf(places, index, options) {
     score: isExternal
       ? columns.score.map((score, frame) => (columns.match[frame] < 0 ? null : score))
       : columns.score,
-    terms: isExternal ? null : termsOf(columns),
     similarity: isExternal
       ? null
       : columns.match.map((match, frame) => round(similarityOf(match, frame), 6)),

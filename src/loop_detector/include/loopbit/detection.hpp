@@ -38,18 +38,6 @@ struct StepTimes {
   double verification_ms = 0;  ///< step 3, matching, geometry and decision
 };
 
-/// Why a score is what it is: the terms of the log odds of the match, in nats. With their sum S the
-/// score is 1 / (1 + exp(-S)). docs/method.md, section 4, has the formulas.
-struct ScoreTerms {
-  double votes = 0;     ///< features of frame and match that moved alike, against other places
-  double geometry = 0;  ///< distinct inliers, against those of wrong places
-  double path = 0;      ///< the frames before, and the steps beside the match in this frame
-  double rivals = 0;    ///< places elsewhere that share the evidence; never above 0
-  double prior = 0;     ///< that a robot returns to this place of all; never above 0
-
-  [[nodiscard]] double sum() const { return votes + geometry + path + rivals + prior; }
-};
-
 /// A frame of one of a map's sessions.
 struct SessionFrame {
   int session = 0;  ///< from 1, in the order in which they were recorded
@@ -66,10 +54,8 @@ struct Detection {
   std::optional<PlaceId> match =
       std::nullopt;  ///< the best candidate, accepted or not, if it is a frame of this session
   std::optional<SessionFrame> earlier_match =
-      std::nullopt;  ///< the same, if it belongs to an earlier session of the map
-  double score = 0;  ///< what was compared with decision.min_score
-  std::optional<ScoreTerms> terms =
-      std::nullopt;       ///< of the score; none without a match or with decision.count_matches
+      std::nullopt;       ///< the same, if it belongs to an earlier session of the map
+  double score = 0;       ///< what was compared with decision.min_score
   double similarity = 0;  ///< xi of query and match
   int matches = 0;        ///< one-to-one feature matches between query and match
   int inliers = 0;        ///< matches that fit one epipolar geometry

@@ -55,8 +55,6 @@ export interface Run {
   earlier_match: ([session: number, frame: number] | null)[] | null;
   /** Null if the detector reports nothing for a frame. */
   score: (number | null)[];
-  /** Of the log odds of the score; null if the detector does not report them. */
-  terms: ScoreTerms | null;
   /** Null if the detector does not report them. */
   similarity: number[] | null;
   matches: number[] | null;
@@ -80,15 +78,6 @@ export interface Run {
   /** By frame number. Not every frame has one: the report has a size budget, which the first
    * frame, wrong loops and the weakest loops use before others. */
   pictures: Record<string, Picture>;
-}
-
-/** In nats; null for frames without a match. */
-export interface ScoreTerms {
-  votes: (number | null)[];
-  geometry: (number | null)[];
-  path: (number | null)[];
-  rivals: (number | null)[];
-  prior: (number | null)[];
 }
 
 export interface StepTimes {
