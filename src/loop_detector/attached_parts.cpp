@@ -165,10 +165,10 @@ void AttachedParts::note(const std::vector<Keypoint>& keypoints) {
   ++num_views_;
   for (Views& views : views_) views &= static_cast<Views>(~bit);
   for (const Keypoint& keypoint : keypoints) {
-    for (int y = -kReach_px; y <= kReach_px; ++y) {
-      for (int x = -kReach_px; x <= kReach_px; ++x) {
-        views_[index_of(rounded(keypoint.x_px) + x, rounded(keypoint.y_px) + y)] |= bit;
-      }
+    const cv::Point middle(rounded(keypoint.x_px), rounded(keypoint.y_px));
+    for (int y = middle.y - kReach_px; y <= middle.y + kReach_px; ++y) {
+      const std::size_t last = index_of(middle.x + kReach_px, y);
+      for (std::size_t i = index_of(middle.x - kReach_px, y); i <= last; ++i) views_[i] |= bit;
     }
   }
 }

@@ -38,7 +38,8 @@ struct Between {
     const double at = (scaled + 0.5) * size / scaled_size - 0.5;
     const double within = std::clamp(at, 0.0, size - 1.0);
     first = static_cast<int>(within);
-    next_weight = static_cast<std::int32_t>(std::lround((within - first) * 256));
+    // Rounded without a call of lround().
+    next_weight = (static_cast<std::int32_t>((within - first) * 512) + 1) / 2;
   }
 
   int first = 0;
