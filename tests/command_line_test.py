@@ -29,13 +29,19 @@ from loopbit_command import (FRAMES, LOOPBIT, QUICK, WORLD, CommandTest, complai
                              loopbit, rows)
 
 HEADER = (
-    "frame,timestamp,status,match,score,similarity,matches,inliers,name,match_name,"
+    "frame,timestamp,status,match,score,similarity,matches,inliers,"
+    "votes,geometry,path,rivals,prior,name,match_name,"
     "content_ms,retrieval_ms,features_ms,verification_ms"
 )
 
 
 def pose_rows(folder):
     with open(folder / "relative_poses.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def late_rows(folder):
+    with open(folder / "late_loops.csv", newline="") as file:
         return list(csv.DictReader(file))
 
 
@@ -68,9 +74,11 @@ class CommandLineTest(CommandTest):
         self.assertEqual((ran.returncode, complaints(ran)), (0, []))
         self.assertIn(f"{self.out}/relative_poses.csv, with {camera}", ran.stdout)
         self.assertEqual(decisions(self.out), decisions(self.reference))
-        loops = [(row["frame"], row["match"]) for row in rows(self.out) if row["status"] == "loop"]
+        loops = [row for row in rows(self.out) if row["status"] == "loop"]
+        loops += [row for row in late_rows(self.out) if row["kind"] == "late"]
         poses = pose_rows(self.out)
-        self.assertEqual([(row["query"], row["match"]) for row in poses], loops)
+        self.assertEqual(sorted((row["query"], row["match"]) for row in poses),
+                         sorted((row["frame"], row["match"]) for row in loops))
         for row in poses:
             self.assertEqual(len(row), 14 + 21)
             is_known = row["known"] != "nothing"
@@ -156,6 +164,39 @@ class CommandLineTest(CommandTest):
                              row["status"] in ("no_earlier_place", "no_similar_place"), row)
             self.assertGreaterEqual(int(row["matches"]), int(row["inliers"]))
 
+    def test_late_loops_are_of_frames_that_were_none_and_truth_judges_both(self):
+        # At a high threshold a path needs frames to become sure.
+        ran = loopbit("run", self.images, "--out", self.out, "--no-report", "--set",
+                      "decision.min_score=0.9999", "--truth", self.dataset / "truth.csv",
+                      "--not-false", self.dataset / "not_false.csv")
+        self.assertEqual((ran.returncode, complaints(ran)), (0, []))
+        status = [row["status"] for row in rows(self.out)]
+        late = [row for row in late_rows(self.out) if row["kind"] == "late"]
+        for row in late:
+            self.assertNotEqual(status[int(row["frame"])], "loop")
+            self.assertLess(int(row["frame"]), int(row["reported_at"]))
+            self.assertGreaterEqual(float(row["score"]), 0.9999)
+        self.assertEqual(len({row["frame"] for row in late}), len(late))
+        record = json.loads((self.out / "run.json").read_text())
+        self.assertEqual(record["counts"]["late_loops"], len(late))
+        self.assertEqual("found late" in ran.stdout, len(late) > 0)
+        score = record["score"]
+        self.assertLessEqual(score["right"], score["late"]["right"])
+        self.assertLessEqual(score["late"]["right"], score["right"] + len(late))
+        again = json.loads(loopbit("eval", self.out, "--json").stdout)
+        self.assertEqual(again["late"], score["late"])
+        if not QUICK:
+            self.assertGreater(len(late), 0)
+
+    def test_terms_add_up_to_the_log_odds_of_the_score(self):
+        for row in rows(self.reference):
+            terms = [row[name] for name in ("votes", "geometry", "path", "rivals", "prior")]
+            if row["match"] == "":
+                self.assertEqual(terms, [""] * 5)
+                continue
+            log_odds = sum(map(float, terms))
+            self.assertAlmostEqual(1 / (1 + math.exp(-log_odds)), float(row["score"]), delta=1e-3)
+
     def test_rows_name_their_image_and_that_of_the_match(self):
         images = sorted(path.name for path in self.images.iterdir())
         self.assertEqual([row["name"] for row in rows(self.reference)], images)
@@ -226,12 +267,20 @@ class CommandLineTest(CommandTest):
     def test_json_is_one_line_per_loop_and_a_summary(self):
         ran = loopbit("run", self.images, "--out", self.out, "--no-report", "--json")
         self.assertEqual((ran.returncode, complaints(ran)), (0, []))
-        *loops, summary = map(json.loads, ran.stdout.splitlines())
+        *lines, summary = map(json.loads, ran.stdout.splitlines())
+        loops = [line for line in lines if line["type"] == "loop"]
+        changes = [line for line in lines if line["type"] != "loop"]
+        self.assertEqual([(line["type"], str(line["frame"]), str(line["reported_at"]))
+                          for line in changes],
+                         [(row["kind"], row["frame"], row["reported_at"])
+                          for row in late_rows(self.out)])
         expected = [row for row in rows(self.out) if row["status"] == "loop"]
         self.assertEqual(len(loops), len(expected))
         for loop, row in zip(loops, expected):
             self.assertEqual(loop.pop("type"), "loop")
             self.assertEqual(f"{loop.pop('similarity'):.6f}", row["similarity"])
+            for name, term in loop.pop("terms").items():
+                self.assertAlmostEqual(term, float(row[name]), delta=6e-4)
             self.assertEqual({key: str(value) for key, value in loop.items()},
                              {key: row[key] for key in loop})
         self.assertEqual(summary, {"type": "summary", "folder": str(self.out),

@@ -253,7 +253,7 @@ class EvaluationCommandTest(CommandTest):
         self.assertIn("evidence.db", os.listdir(self.reference))
         plain = loopbit("run", self.few_images(), "--out", self.out, "--no-report")
         self.assertEqual(plain.returncode, 0, plain.stderr)
-        self.assertEqual(sorted(os.listdir(self.out)), ["loops.csv", "run.json"])
+        self.assertEqual(sorted(os.listdir(self.out)), ["late_loops.csv", "loops.csv", "run.json"])
         made = loopbit("report", self.out)
         self.assertEqual(made.returncode, 0, made.stderr)
         self.assertIn("report.html", os.listdir(self.out))
@@ -347,11 +347,13 @@ class EvaluationCommandTest(CommandTest):
         run = self.scratch / "run"
         run.mkdir()
         header, *lines = (self.reference / "loops.csv").read_text().splitlines()
+        at = header.split(",").index("name")
         loop = next(row for row in rows(self.reference) if row["status"] == "loop")
         for name in ("a b.png", "a\\x2cb.png", ""):
             with self.subTest(name):
-                changed = [",".join([*cells[:8], name if cells[0] == loop["match"] else cells[8], *cells[9:]])
-                           for cells in (line.split(",") for line in lines)]
+                cells = [line.split(",") for line in lines]
+                cells[int(loop["match"])][at] = name
+                changed = [",".join(row) for row in cells]
                 (run / "loops.csv").write_text("\n".join([header, *changed, ""]))
                 self.assert_fails(loopbit("pairs", run), 3, f"Frame {loop['match']}", f"'{name}'")
 

@@ -57,6 +57,25 @@ TEST(Evaluate, TellsRightToleratedWrongMissedAndIgnored) {
   EXPECT_EQ(evaluation.pairs.wrong, 1);
 }
 
+TEST(Evaluate, LateAndWithdrawnLoopsAreCountedBeside) {
+  const GroundTruth truth{{{10, 0, 2}, {11, 1, 3}, {12, 2, 4}, {13, 3, 5}}, {}, {}};
+  MatchList list = of_frames({loop(10, 2), rejected(11, 2, 0.5), loop(12, 9), loop(13, 4)}, 14);
+  // 11 is found late, the wrong loop of 12 is withdrawn and found again, 9 is found late and wrong.
+  list.changes = {loop(11, 2, 0.99), rejected(12, 9, 0.1), loop(12, 3, 0.99), loop(9, 0, 0.99)};
+  const Evaluation evaluation = evaluate(list, truth);
+  EXPECT_EQ(evaluation.decision.right, 2);
+  EXPECT_EQ(evaluation.decision.wrong, 1);
+  EXPECT_EQ(evaluation.missed, (std::vector<int>{11, 12}));
+  EXPECT_EQ(evaluation.late.positives, 4);
+  EXPECT_EQ(evaluation.late.right, 4);
+  EXPECT_EQ(evaluation.late.wrong, 1);
+  list.changes = {loop(11, -1, 0.99), rejected(13, 4, 0.2)};
+  EXPECT_EQ(evaluate(list, truth).late.positives, 3) << "11 is in another recording";
+  EXPECT_EQ(evaluate(list, truth).late.right, 1);
+  list.changes = {};
+  EXPECT_EQ(evaluate(list, truth).late.right, evaluation.decision.right);
+}
+
 TEST(Evaluate, NothingFoundIsPreciseAndHasNoRecall) {
   const Evaluation evaluation = evaluate({}, {{{5, 0, 0}}, {}, {}});
   EXPECT_EQ(evaluation.decision.recall(), 0.0);

@@ -74,6 +74,16 @@ void expect_same_answer(const Detection& a, const Detection& b) {
   EXPECT_EQ(a.similarity, b.similarity);
   EXPECT_EQ(a.matches, b.matches);
   EXPECT_EQ(a.inliers, b.inliers);
+  const auto expect_same = [](const std::vector<LateLoop>& x, const std::vector<LateLoop>& y) {
+    ASSERT_EQ(x.size(), y.size());
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      EXPECT_EQ(x[i].frame, y[i].frame);
+      EXPECT_EQ(x[i].match, y[i].match);
+      EXPECT_EQ(x[i].score, y[i].score);
+    }
+  };
+  expect_same(a.late_loops, b.late_loops);
+  expect_same(a.withdrawn_loops, b.withdrawn_loops);
 }
 
 void expect_same_answers(const std::vector<Detection>& a, const std::vector<Detection>& b) {

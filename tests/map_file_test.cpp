@@ -69,6 +69,30 @@ TEST_F(MapFile, AFinishedSessionLetsOthersWrite) {
                [&] { const MapWriter third(map_path_, fast_options(), "third"); });
 }
 
+TEST_F(MapFile, LateLoopsAreLoopsAndWithdrawnOnesAreRejected) {
+  {
+    MapWriter map(map_path_, fast_options(), "drive");
+    for (int frame = 0; frame < 4; ++frame) add_frame(map, frame);
+    add_frame(map, 4, SessionFrame{1, 0});
+    Detection later{.frame = 5, .status = Status::low_score};
+    later.late_loops = {{.frame = 3, .match = 1, .score = 0.99, .similarity = 0.5}};
+    later.withdrawn_loops = {{.frame = 4, .earlier_match = SessionFrame{1, 0}, .score = 0.25}};
+    map.add(later, content_of(5), std::make_shared<const Features>(few_features(5)), {});
+    map.finish();
+  }
+  MapReader map(map_path_);
+  ASSERT_EQ(map.loops().size(), 1U);
+  EXPECT_EQ(map.loops()[0].query, (SessionFrame{1, 3}));
+  EXPECT_EQ(map.loops()[0].match, (SessionFrame{1, 1}));
+  EXPECT_EQ(map.loops()[0].score, 0.99);
+  EXPECT_EQ(map.loops()[0].similarity, 0.5);
+  EXPECT_EQ(map.loops()[0].inliers, 0);
+  ASSERT_EQ(map.rejected_loops().size(), 1U);
+  EXPECT_EQ(map.rejected_loops()[0].query, (SessionFrame{1, 4}));
+  EXPECT_EQ(map.rejected_loops()[0].match, (SessionFrame{1, 0}));
+  EXPECT_TRUE(map.damage().empty());
+}
+
 TEST_F(MapFile, KeepsSessionsAndLoopsApart) {
   add_session(map_path_, 5, "first");
   add_session(map_path_, 6, "second", SessionFrame{1, 4});

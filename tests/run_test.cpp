@@ -45,6 +45,7 @@ TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
               .status = Status::loop,
               .match = 0,
               .score = 20.5,
+              .terms = ScoreTerms{2.5, 1, 8.0625, -0.5, -9.25},
               .similarity = 0.25,
               .matches = 30,
               .inliers = 21,
@@ -53,10 +54,16 @@ TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
   EXPECT_EQ(lines_of(path("run/loops.csv")),
             (std::vector<std::string>{
                 kLoopsHeader,
-                "0,12.500000,no_earlier_place,,0,0.000000,0,0,0.png,,0.000,0.000,0.000,0.000",
-                R"(1,,loop,0,20.5,0.250000,30,21,left\x2c \x22new\x22\x0a/1.png,0.png,)"
+                "0,12.500000,no_earlier_place,,0,0.000000,0,0,,,,,,0.png,,0.000,0.000,0.000,0.000",
+                R"(1,,loop,0,20.5,0.250000,30,21,2.500,1.000,8.062,-0.500,-9.250,)"
+                R"(left\x2c \x22new\x22\x0a/1.png,0.png,)"
                 "1.000,0.500,12.250,3.000"}));
-  EXPECT_EQ(read_detections(path("run/loops.csv"))[0].name, "0.png");
+  const auto read = read_detections(path("run/loops.csv"));
+  EXPECT_EQ(read[0].name, "0.png");
+  EXPECT_FALSE(read[0].terms);
+  ASSERT_TRUE(read[1].terms);
+  EXPECT_EQ(read[1].terms->rivals, -0.5);
+  EXPECT_EQ(read[1].terms->prior, -9.25);
   EXPECT_EQ(read_match_list(path("run/loops.csv")).matches.size(), 1U);
 }
 
@@ -250,18 +257,64 @@ TEST_F(RunFolderTest, AChangedRowIsNamed) {
     test::expect_error(ErrorKind::input, {file, "line 2", part},
                        [&] { (void)read_detections(file); });
   };
-  expect_refused("0,,loop,0,1,0,0,0,,,0,0,0", "13 columns");
-  expect_refused("0,,maybe,0,1,0,0,0,,,0,0,0,0", "'maybe'");
-  expect_refused("0,,loop,x,1,0,0,0,,,0,0,0,0", "'x'");
-  expect_refused("1,,loop,0,1,0,0,0,,,0,0,0,0", "'1'");
-  expect_refused("0,,loop,-7,1,0,0,0,,,0,0,0,0", "'-7'");
-  expect_refused("0,,loop,0,nan,0,0,0,,,0,0,0,0", "'nan'");
-  expect_refused("0,,loop,0,1,inf,0,0,,,0,0,0,0", "'inf'");
+  expect_refused("0,,loop,0,1,0,0,0,,,,,,,,0,0,0", "18 columns");
+  expect_refused("0,,maybe,0,1,0,0,0,,,,,,,,0,0,0,0", "'maybe'");
+  expect_refused("0,,loop,x,1,0,0,0,,,,,,,,0,0,0,0", "'x'");
+  expect_refused("1,,loop,0,1,0,0,0,,,,,,,,0,0,0,0", "'1'");
+  expect_refused("0,,loop,-7,1,0,0,0,,,,,,,,0,0,0,0", "'-7'");
+  expect_refused("0,,loop,0,nan,0,0,0,,,,,,,,0,0,0,0", "'nan'");
+  expect_refused("0,,loop,0,1,inf,0,0,,,,,,,,0,0,0,0", "'inf'");
+  expect_refused("0,,loop,0,1,0,0,0,1,,2,3,4,,,0,0,0,0", "''");
   const std::string carried =
-      write("loops.csv", std::string(kLoopsHeader) + "\r\n0,,loop,0,1,0,0,0,,,0,0,0,0\r\n");
+      write("loops.csv", std::string(kLoopsHeader) + "\r\n0,,loop,0,1,0,0,0,,,,,,,,0,0,0,0\r\n");
   EXPECT_EQ(read_detections(carried).size(), 1U);
   test::expect_error(ErrorKind::input, {path("none"), "loops.csv"},
                      [&] { (void)read_run(path("none")); });
+}
+
+TEST_F(RunFolderTest, LateLoopsAreReadWhereTheyWereReported) {
+  {
+    RunFolder folder(path("run"), false);
+    folder.add({.frame = 0, .name = "a,b.png"});
+    folder.add({.frame = 1, .status = Status::loop, .match = 0, .score = 0.99});
+    folder.add({.frame = 2,
+                .late_loops = {{.frame = 1, .match = 0, .score = 0.995, .similarity = 0.25},
+                               {.frame = 0, .earlier_match = SessionFrame{2, 7}, .score = 0.99}},
+                .withdrawn_loops = {{.frame = 1, .match = 0, .score = 0.125}},
+                .name = "c"});
+  }
+  EXPECT_EQ(
+      lines_of(path("run/late_loops.csv")),
+      (std::vector<std::string>{kLateLoopsHeader, "1,withdrawn,0,0.125,0.000000,2,,a\\x2cb.png",
+                                "1,late,0,0.995,0.250000,2,,a\\x2cb.png",
+                                "0,late,2:7,0.99,0.000000,2,a\\x2cb.png,"}));
+  const std::vector<Detection> read = read_run(path("run")).detections;
+  ASSERT_EQ(read[2].late_loops.size(), 2U);
+  EXPECT_EQ(read[2].late_loops[0].match, 0);
+  EXPECT_EQ(read[2].late_loops[0].similarity, 0.25);
+  EXPECT_EQ(read[2].late_loops[1].earlier_match, (SessionFrame{2, 7}));
+  ASSERT_EQ(read[2].withdrawn_loops.size(), 1U);
+  EXPECT_EQ(read[2].withdrawn_loops[0].score, 0.125);
+  EXPECT_EQ(
+      match_list(read).changes,
+      (std::vector<ReportedMatch>{{1, 0, 0.125, false}, {1, 0, 0.995, true}, {0, -1, 0.99, true}}));
+  EXPECT_TRUE(match_list(read).matches[0].is_loop) << "decisions at once stay as they were";
+}
+
+TEST_F(RunFolderTest, AChangedRowOfLateLoopsIsNamed) {
+  RunFolder(path("run"), false).add({.frame = 0});
+  const auto expect_refused = [&](const std::string& row, std::string_view part) {
+    const std::string file =
+        write("run/late_loops.csv", std::string(kLateLoopsHeader) + "\n" + row + "\n");
+    test::expect_error(ErrorKind::input, {file, "line 2", part},
+                       [&] { (void)read_run(path("run")); });
+  };
+  expect_refused("1,late,0,1,0,2,", "7 columns");
+  expect_refused("1,later,0,1,0,2,,", "'later'");
+  expect_refused("1,late,1,1,0,2,,", "'1'");
+  expect_refused("2,late,0,1,0,2,,", "'2'");
+  (void)write("run/late_loops.csv", std::string(kLateLoopsHeader) + "\n2,late,0,1,0,9,,\n");
+  EXPECT_EQ(read_run(path("run")).detections.size(), 1U) << "its frame did not reach the disk";
 }
 
 TEST_F(RunFolderTest, TruthThatIsHalfWrittenIsNone) {
@@ -285,7 +338,7 @@ TEST_F(RunFolderTest, AReplacedRunLeavesNothingBeside) {
   RunFolder replaced(path("run"), true);
   replaced.add({.frame = 0, .status = Status::unreadable});
   replaced.write_record(stopped_by("end"));
-  EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 2);
+  EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 3);
 }
 
 /// A run of `frames` unreadable frames that has ended, or as far as it came.
@@ -307,7 +360,7 @@ TEST_F(RunFolderTest, ARunWithoutARowReplacesNothing) {
     write_run(path("run"), 0, reason);
     EXPECT_EQ(frames_in(path("run")), 3U);
     EXPECT_EQ(lines_of(path("run/run.json")), before);
-    EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 2);
+    EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 3);
   }
 }
 
@@ -347,7 +400,7 @@ TEST_F(RunFolderTest, ARunThatACrashLeftHalfMovedIsMovedWhole) {
     EXPECT_TRUE(fs::exists(path("run/run.json")));
   }
   fs::create_directory(path("run/earlier_run.part"));
-  for (const char* name : {"loops.csv", "run.json"}) {
+  for (const char* name : {"late_loops.csv", "loops.csv", "run.json"}) {
     fs::rename(path("run/") + name, path("run/earlier_run.part/") + name);
   }
   test::expect_error(ErrorKind::output, {"earlier_run.part/loops.csv", "--overwrite"},

@@ -36,6 +36,11 @@ _DETECTION = numpy.dtype(
         ("similarity", "f8"),
         ("matches", "i4"),
         ("inliers", "i4"),
+        ("votes", "f8"),
+        ("geometry", "f8"),
+        ("path", "f8"),
+        ("rivals", "f8"),
+        ("prior", "f8"),
         ("name", object),
         ("match_name", object),
         ("content_ms", "f8"),
@@ -46,11 +51,18 @@ _DETECTION = numpy.dtype(
 )
 
 
+def _terms(detection: Detection) -> tuple[float, ...]:
+    terms = detection.terms
+    if terms is None:
+        return (numpy.nan,) * 5
+    return terms.votes, terms.geometry, terms.path, terms.rivals, terms.prior
+
+
 def detections_array(detections: Iterable[Detection]) -> numpy.typing.NDArray[Any]:
     """Converts detections to a structured array with the columns of loops.csv.
 
     A match with an earlier session of a map has two columns, earlier_session and earlier_frame.
-    Missing values are nan in timestamp_s, -1 in match and earlier_frame, 0 in earlier_session, and
+    Missing values are nan in timestamp_s and the terms of the score, -1 in match and earlier_frame, 0 in earlier_session, and
     empty in name and match_name.
     """
     detections = list(detections)
@@ -67,6 +79,7 @@ def detections_array(detections: Iterable[Detection]) -> numpy.typing.NDArray[An
             d.similarity,
             d.matches,
             d.inliers,
+            *_terms(d),
             d.name,
             "" if d.match is None else names.get(d.match, ""),
             d.times.content_ms,

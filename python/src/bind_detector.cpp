@@ -104,6 +104,40 @@ void bind_detection(py::module_& module) {
             "verification_ms={:.3f})",
             t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
       });
+  py::class_<ScoreTerms>(
+      module, "ScoreTerms",
+      "The terms of the log odds of a match, in nats. With their sum S the score "
+      "is 1 / (1 + exp(-S)).")
+      .def_readonly("votes", &ScoreTerms::votes,
+                    "Features of frame and match that moved alike, against other places.")
+      .def_readonly("geometry", &ScoreTerms::geometry,
+                    "Distinct inliers, against those of wrong places.")
+      .def_readonly("path", &ScoreTerms::path,
+                    "The frames before, and the steps beside the match in this frame.")
+      .def_readonly("rivals", &ScoreTerms::rivals,
+                    "Places elsewhere that share the evidence; never above 0.")
+      .def_readonly("prior", &ScoreTerms::prior,
+                    "That a robot returns to this place of all; never above 0.")
+      .def("__repr__", [](const ScoreTerms& t) {
+        return fmt::format(
+            "ScoreTerms(votes={:.2f}, geometry={:.2f}, path={:.2f}, rivals={:.2f}, prior={:.2f})",
+            t.votes, t.geometry, t.path, t.rivals, t.prior);
+      });
+  py::class_<LateLoop>(module, "LateLoop",
+                       "A loop of an earlier frame that a later one found, or withdrew.")
+      .def_readonly("frame", &LateLoop::frame, "The earlier frame, of this session.")
+      .def_readonly("match", &LateLoop::match, "As in Detection.")
+      .def_readonly("earlier_match", &LateLoop::earlier_match, "As in Detection.")
+      .def_readonly("score", &LateLoop::score,
+                    "The probability that it is right, by all frames until now.")
+      .def_readonly("similarity", &LateLoop::similarity, "xi of frame and match.")
+      .def("__repr__", [](const LateLoop& loop) {
+        return fmt::format(
+            "LateLoop(frame={}, {}={}, score={:.4f})", loop.frame,
+            loop.match ? "match" : "earlier_match",
+            loop.match ? fmt::format("{}", *loop.match) : literal(py::cast(loop.earlier_match)),
+            loop.score);
+      });
   py::class_<Detection>(module, "Detection",
                         "The result for one frame, with the numbers behind the decision.")
       .def_readonly("frame", &Detection::frame, "Number of the frame, from 0.")
@@ -119,11 +153,20 @@ void bind_detection(py::module_& module) {
           "score", &Detection::score,
           "The probability that the match is right, 0 to 1; a loop from decision.min_score. "
           "The number of matches with decision.count_matches.")
+      .def_readonly("terms", &Detection::terms,
+                    "The terms of the score's log odds; None without a match or with "
+                    "decision.count_matches.")
       .def_readonly("similarity", &Detection::similarity, "xi of frame and match.")
       .def_readonly("matches", &Detection::matches, "Number of one-to-one feature matches.")
       .def_readonly("inliers", &Detection::inliers,
                     "Number of matches that fit one epipolar geometry.")
       .def_readonly("times", &Detection::times, "The time of each step.")
+      .def_readonly("late_loops", &Detection::late_loops,
+                    "Loops of the last few views, which this frame made sure: their frames had "
+                    "none. List of LateLoop.")
+      .def_readonly("withdrawn_loops", &Detection::withdrawn_loops,
+                    "Loops reported before that are more likely wrong than right after this "
+                    "frame. List of LateLoop.")
       .def_property_readonly("name", text_of(&Detection::name),
                              "The name of the image in its source; empty without a source.")
       .def_property_readonly(

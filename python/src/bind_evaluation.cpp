@@ -118,6 +118,8 @@ void bind_result(py::module_& module) {
   py::class_<Evaluation>(module, "Evaluation", "The score of a detector's matches.")
       .def_readonly("decision", &Evaluation::decision,
                     "Counts per query, with the detector's own decisions.")
+      .def_readonly("late", &Evaluation::late,
+                    "The same with loops that were found late, and without withdrawn ones.")
       .def_readonly("pairs", &Evaluation::pairs,
                     "Counts per pair, with the detector's own decisions.")
       .def_property_readonly(

@@ -46,6 +46,14 @@ void print_decision(const DecisionCounts& counts) {
   }
 }
 
+void print_late(const Evaluation& evaluation) {
+  const DecisionCounts& late = evaluation.late;
+  const DecisionCounts& decision = evaluation.decision;
+  if (late.right == decision.right && late.wrong == decision.wrong) return;
+  fmt::print("late       with late and without withdrawn loops: recall {}; {} wrong\n",
+             share_text(late.recall(), late.positives, 4), late.wrong);
+}
+
 void print_pairs(const PairCounts& pairs) {
   fmt::print("pairs      {} of {} true pairs found: recall {}; {} wrong: precision {}\n",
              pairs.found, pairs.positives, share_text(pairs.recall(), pairs.positives, 4),
@@ -101,6 +109,7 @@ void eval_command(const EvalFlags& flags) {
     fmt::print("tolerance  {} frames\n", run.evaluation.tolerance_frames);
   }
   print_decision(evaluation.decision);
+  print_late(evaluation);
   print_sweep(evaluation);
   print_pairs(evaluation.pairs);
   print_wrong(evaluation.wrong_loops);

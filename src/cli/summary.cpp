@@ -18,6 +18,18 @@ std::ptrdiff_t count(const std::vector<Detection>& detections, Status status) {
                        [&](const Detection& d) { return d.status == status; });
 }
 
+/// What later frames changed.
+void print_changes(const std::vector<Detection>& detections) {
+  std::size_t late = 0;
+  std::size_t withdrawn = 0;
+  for (const Detection& d : detections) {
+    late += d.late_loops.size();
+    withdrawn += d.withdrawn_loops.size();
+  }
+  if (late > 0) fmt::print("  {:>9} more found late, once the path was sure\n", late);
+  if (withdrawn > 0) fmt::print("  {:>9} withdrawn by later frames\n", withdrawn);
+}
+
 /// How often frames that found nothing did so, and what that means, in the order of the steps.
 void print_reasons(const std::vector<Detection>& detections) {
   constexpr std::pair<Status, const char*> kReasons[] = {
@@ -53,11 +65,17 @@ void print_revisits(const std::vector<Detection>& detections) {
   }
 }
 
-void print_score(const DecisionCounts& score) {
+void print_score(const Evaluation& evaluation) {
+  const DecisionCounts& score = evaluation.decision;
   fmt::print("truth      {} of {} revisits found: recall {}; {} wrong loop{}: precision {}\n",
              score.right, score.positives, share_text(score.recall(), score.positives, 3),
              score.wrong, score.wrong == 1 ? "" : "s",
              share_text(score.precision(), score.right + score.wrong, 3));
+  const DecisionCounts& late = evaluation.late;
+  if (late.right != score.right || late.wrong != score.wrong) {
+    fmt::print("           with late and without withdrawn loops: recall {}; {} wrong\n",
+               share_text(late.recall(), late.positives, 3), late.wrong);
+  }
   if (score.ignored > 0) fmt::print("           {} frames are not scored\n", score.ignored);
 }
 
@@ -89,10 +107,11 @@ void print_summary(const RunOutcome& run, const std::string& report) {
   fmt::print("loops      {} frame{} at a place seen before{}\n", loops, loops == 1 ? "" : "s",
              elsewhere == 0 ? "" : fmt::format(", {} in earlier sessions of the map", elsewhere));
   print_revisits(detections);
+  print_changes(detections);
   print_reasons(detections);
-  if (record.score) print_score(record.score->decision);
+  if (record.score) print_score(*record.score);
   print_times(record, detections);
-  fmt::print("written    {0}/loops.csv, {0}/run.json\n", printable(run.folder));
+  fmt::print("written    {0}/loops.csv, {0}/late_loops.csv, {0}/run.json\n", printable(run.folder));
   if (!record.camera.empty()) {
     fmt::print("poses      {}/relative_poses.csv, with {}\n", printable(run.folder),
                printable(record.camera));

@@ -212,7 +212,10 @@ double PairCounts::precision() const { return share(right, right + wrong, 1.0); 
 
 Evaluation evaluate(const MatchList& list, const GroundTruth& truth,
                     const EvaluationOptions& options) {
-  return Scorer(list, truth, options).score();
+  Evaluation evaluation = Scorer(list, truth, options).score();
+  const MatchList late = with_changes(list);
+  evaluation.late = Scorer(late, truth, options).score().decision;
+  return evaluation;
 }
 
 }  // namespace loopbit

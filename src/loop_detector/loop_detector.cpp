@@ -21,6 +21,7 @@
 #include "attached_parts.hpp"
 #include "candidate_filter.hpp"
 #include "known_loops.hpp"
+#include "late_loops.hpp"
 #include "place_filter.hpp"
 #include "place_memory.hpp"
 #include "recent_view.hpp"
@@ -135,6 +136,7 @@ class LoopDetector::Impl {
     std::optional<VerifiedCandidate> best;  ///< of them
     bool closely = false;                   ///< see CandidateVerifier::Query
     PlaceFilter::Update update;
+    LateLoops::Found changed;  ///< loops of earlier frames
     Workspaces::Lease work;
   };
 
@@ -184,7 +186,7 @@ class LoopDetector::Impl {
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
     auto candidates = index_.query(seen.content, end, options_.retrieval, nullptr, seen.is_allowed);
-    PlaceFilter::Belief prior = place_filter_.predict(seen.look.is_step);
+    Belief prior = place_filter_.predict(seen.look.is_step);
     // Where the robot is sure to be back, half of them are rivals enough.
     const double revisit = 1 - prior.elsewhere();
     if (revisit >= options_.decision.min_score) candidates.resize((candidates.size() + 1) / 2);
@@ -196,6 +198,7 @@ class LoopDetector::Impl {
     seen.closely = revisit >= kWorthACloserLook;
     seen.verified = seen.work->candidates.verify(verified_query(seen), candidates, num_similar);
     decide(seen, std::move(prior), num_similar, end, detection);
+    report_earlier_frames(seen, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
   }
 
@@ -247,6 +250,11 @@ class LoopDetector::Impl {
       const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
       found.add(seen.look.is_step ? latest + 1 : latest, seen.best->step);
     }
+    LateLoops::Next frame;
+    if (!options_.decision.count_matches) {
+      frame = LateLoops::prepare(seen.update, index_.size(), detection.status == Status::loop,
+                                 known_loops_);
+    }
     PlaceFilter::Next next =
         place_filter_.prepare(std::move(seen.update), seen.look.is_step, known_loops_);
     const cv::Size working_size_px = seen.features.working_size_px;
@@ -258,6 +266,11 @@ class LoopDetector::Impl {
     latest_view_inliers_ = seen.view_inliers;
     known_loops_.take(found);
     place_filter_.commit(std::move(next));
+    if (frame.empty()) return;
+    late_loops_.commit(std::move(frame), seen.look.is_step, seen.changed);
+    for (const LateLoops::Loop& loop : seen.changed.withdrawn) {
+      known_loops_.remove(step_of(loop.frame), loop.matched_step);
+    }
   }
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
@@ -274,6 +287,7 @@ class LoopDetector::Impl {
     if (filter_.is_removed(*place)) return;
     memory_.remove(*place, recent_view_.is_in_view(*place));
     filter_.remove(*place);
+    late_loops_.remove(*place);
   }
 
   /// See LoopDetector::reject. The map may have loops of places that are gone.
@@ -287,6 +301,7 @@ class LoopDetector::Impl {
     known_loops_.remove(step_of(*place), step_of(*wrong));
     if (*place < memory_.session_begin()) return;
     place_filter_.withdraw(step_of(*wrong), known_loops_);
+    late_loops_.reject(*place, step_of(*wrong), known_loops_);
     if (step_of(index_.size() - 1) == step_of(*place)) filter_.reject(*wrong);
   }
 
@@ -470,7 +485,7 @@ class LoopDetector::Impl {
 
   /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
   /// while.
-  void add_expected(const Observation& seen, const PlaceFilter::Belief& prior, PlaceId end,
+  void add_expected(const Observation& seen, const Belief& prior, PlaceId end,
                     std::vector<Candidate>& candidates) const {
     if (options_.decision.count_matches) return;
     for (const std::ptrdiff_t middle :
@@ -488,7 +503,7 @@ class LoopDetector::Impl {
     }
   }
 
-  void decide(Observation& seen, PlaceFilter::Belief prior, std::size_t num_similar, PlaceId end,
+  void decide(Observation& seen, Belief prior, std::size_t num_similar, PlaceId end,
               Detection& detection) const {
     const DecisionOptions& decision = options_.decision;
     if (seen.verified.empty()) {
@@ -506,10 +521,43 @@ class LoopDetector::Impl {
     if (!seen.update.match) return;
     report_match(seen.verified[*seen.update.match], seen, detection);
     detection.score = seen.update.probability;
+    detection.terms = seen.update.terms;
     detection.status = seen.update.probability >= decision.min_score ? Status::loop
                        : seen.update.revisit >= decision.min_score
                            ? Status::ambiguous
                            : reason_of_rejection(*seen.best->geometry, options_.verification);
+  }
+
+  /// What the frame tells of those before it.
+  void report_earlier_frames(Observation& seen, Detection& detection) const {
+    const DecisionOptions& decision = options_.decision;
+    if (decision.count_matches) return;
+    seen.changed =
+        late_loops_.find(seen.update, seen.look.is_step, decision.min_score, known_loops_);
+    for (const LateLoops::Loop& loop : seen.changed.late) {
+      detection.late_loops.push_back(late_loop(loop));
+    }
+    for (const LateLoops::Loop& loop : seen.changed.withdrawn) {
+      detection.withdrawn_loops.push_back(late_loop(loop));
+    }
+  }
+
+  [[nodiscard]] LateLoop late_loop(const LateLoops::Loop& loop) const {
+    LateLoop late{.frame = loop.frame - memory_.session_begin(),
+                  .score = loop.probability,
+                  .similarity = loop.similarity};
+    set_match(loop.match, late);
+    return late;
+  }
+
+  /// `Found`: a Detection or a LateLoop.
+  template <typename Found>
+  void set_match(PlaceId place, Found& found) const {
+    if (place < memory_.session_begin()) {
+      found.earlier_match = memory_.origin(place);
+    } else {
+      found.match = place - memory_.session_begin();
+    }
   }
 
   /// As in the paper.
@@ -528,12 +576,7 @@ class LoopDetector::Impl {
     std::vector<VerifiedCandidate> match{best};
     seen.work->candidates.complete(verified_query(seen), match);
     seen.best = match.front();
-    const PlaceId place = seen.best->candidate.place;
-    if (place < memory_.session_begin()) {
-      detection.earlier_match = memory_.origin(place);
-    } else {
-      detection.match = place - memory_.session_begin();
-    }
+    set_match(seen.best->candidate.place, detection);
     detection.similarity = seen.best->candidate.similarity;
     detection.matches = seen.best->geometry->matches;
     detection.inliers = seen.best->geometry->inliers;
@@ -549,6 +592,7 @@ class LoopDetector::Impl {
   int latest_view_inliers_ = 0;  ///< see inlier_worth()
   KnownLoops known_loops_;
   PlaceFilter place_filter_;
+  LateLoops late_loops_;
   mutable Workspaces workspaces_;
 };
 

@@ -3,25 +3,15 @@
 #include "place_filter.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <functional>
-#include <map>
 #include <numbers>
 #include <utility>
 
 namespace loopbit {
 namespace {
 
-/// A robot follows an earlier path for a hundred changes of view on average, and is somewhere new
-/// for as long in between. Ten times more or less changes little.
-constexpr double kLeave = 0.01;
-constexpr double kReturn = 0.01;
-/// A path is followed at 0, 1 or 2 steps per step, most likely at the speed of before.
-constexpr std::array kMoves{0.25, 0.5, 0.25};
-/// Robots seldom turn round on a path.
-constexpr double kTurn = 0.01;
 /// Steps at most so far apart show the same place.
 constexpr std::ptrdiff_t kOnePathSteps = 12;
 /// The match is the one that shows most among places so close to the likeliest step.
@@ -63,13 +53,6 @@ constexpr double kFullExcess = 4;
 /// No frame can say more.
 constexpr double kMaxLogRatio = 30;
 
-/// To about a billionth: mathematical functions may differ in the last bit between processors, and
-/// answers must not.
-double rounded(double value) {
-  constexpr double kScale = 1 << 30;
-  return std::round(value * kScale) / kScale;
-}
-
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -97,50 +80,21 @@ auto find_step(Pairs& pairs, std::ptrdiff_t step) {
   return found != pairs.end() && found->first == step ? found : pairs.end();
 }
 
-bool is_near(std::ptrdiff_t a, std::ptrdiff_t b, const KnownLoops& loops) {
-  return std::abs(a - b) <= kOnePathSteps ||
-         is_same_place({a, loops.first_visit(a)}, {b, loops.first_visit(b)});
-}
-
-PlaceFilter::Hypothesis& hypothesis_at(std::vector<PlaceFilter::Hypothesis>& places,
-                                       std::ptrdiff_t step) {
-  auto found = std::ranges::lower_bound(places, step, {}, &PlaceFilter::Hypothesis::step);
-  if (found == places.end() || found->step != step) found = places.insert(found, {step});
-  return *found;
-}
-
-/// What a new frame could return to: each place looked at gets its part of the probability.
-void return_to(const std::vector<PlaceFilter::Observed>& observed, std::ptrdiff_t num_steps,
-               PlaceFilter::Belief& prior) {
-  const double share = kReturn * prior.elsewhere() /
-                       (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
-  std::vector<std::ptrdiff_t> steps;
-  steps.reserve(observed.size());
-  for (const auto& o : observed) steps.push_back(o.step);
-  std::ranges::sort(steps);
-  steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
-  for (const std::ptrdiff_t step : steps) {
-    PlaceFilter::Hypothesis& at = hypothesis_at(prior.places, step);
-    at.forward += share;
-    at.backward += share;
-  }
-}
-
 /// Laps through one place are one place: what is known of one is known of the other.
-void share_among_laps(const KnownLoops& loops, std::vector<PlaceFilter::Hypothesis>& places) {
+void share_among_laps(const KnownLoops& loops, std::vector<Hypothesis>& places) {
   std::vector<std::ptrdiff_t> steps;
   steps.reserve(places.size());
   for (const auto& at : places) steps.push_back(at.step);
   for (const std::ptrdiff_t step : steps) {
     const auto first = loops.first_visit_of(step);
     if (!first) continue;
-    const PlaceFilter::Hypothesis other = hypothesis_at(places, *first);
-    PlaceFilter::Hypothesis& here = hypothesis_at(places, step);
+    const Hypothesis other = hypothesis_at(places, *first);
+    Hypothesis& here = hypothesis_at(places, step);
     const double forward = kShareOfLaps * (other.forward - here.forward);
     const double backward = kShareOfLaps * (other.backward - here.backward);
     here.forward += forward;
     here.backward += backward;
-    PlaceFilter::Hypothesis& there = hypothesis_at(places, *first);
+    Hypothesis& there = hypothesis_at(places, *first);
     there.forward -= forward;
     there.backward -= backward;
   }
@@ -164,12 +118,6 @@ ByStep log_ratios(const std::vector<PlaceFilter::Observed>& observed) {
   return largest_of_steps(observed, [](const auto& o) { return o.log_likelihood_ratio(); });
 }
 
-/// The step with most probability.
-std::optional<std::ptrdiff_t> peak(const PlaceFilter::Belief& belief) {
-  if (belief.places.empty()) return std::nullopt;
-  return std::ranges::max_element(belief.places, {}, &PlaceFilter::Hypothesis::probability)->step;
-}
-
 /// Of the candidates for which `is_eligible(o)`, the one with the largest `value(o)`.
 template <typename Eligible, typename Value>
 std::optional<std::size_t> best_of(const std::vector<PlaceFilter::Observed>& observed,
@@ -182,81 +130,114 @@ std::optional<std::size_t> best_of(const std::vector<PlaceFilter::Observed>& obs
   return best;
 }
 
-/// Which candidate is the match, and how probable: all hypotheses around the likeliest step and on
-/// laps through the same place count for it.
-void choose_match(std::ptrdiff_t num_steps, const KnownLoops& loops, PlaceFilter::Update& update) {
+/// What the filter knows of where the robot is after a frame.
+struct Posterior {
+  const std::vector<Hypothesis>& places;
+  double elsewhere = 0;  ///< the rest of the probability, even where it is very small
+};
+
+/// Log odds of one that becomes `exp(log_ratio)` times as probable, for log_ratio <= 0.
+double less_probable(double log_odds, double log_ratio) {
+  return log_odds + log_ratio - std::log1p(-std::expm1(log_ratio) * std::exp(log_odds));
+}
+
+/// The terms of a match, of which all but the path are known, so that they add up to `log_odds`.
+ScoreTerms with_path(ScoreTerms terms, double log_odds) {
+  terms.path = 0;
+  terms.path = log_odds - terms.sum();
+  for (double* term : {&terms.votes, &terms.geometry, &terms.path, &terms.rivals, &terms.prior}) {
+    *term = PlaceFilter::rounded(*term);
+  }
+  return terms;
+}
+
+/// Of a match near the likeliest step: all hypotheses around it and on laps through the same place
+/// count for it.
+double log_odds_near(std::ptrdiff_t middle, const Posterior& posterior, const KnownLoops& loops,
+                     ScoreTerms& terms) {
+  double here = 0;
+  double others = posterior.elsewhere;
+  for (const Hypothesis& h : posterior.places) {
+    (PlaceFilter::is_near(h.step, middle, loops) ? here : others) += h.probability();
+  }
+  terms.rivals = std::log(posterior.elsewhere / others);
+  return std::log(here / others);
+}
+
+/// Of a match for which no path speaks: it is as probable as after a return from somewhere new.
+double log_odds_from_anywhere(const Posterior& posterior, const ScoreTerms& terms) {
+  double revisit = 0;
+  for (const Hypothesis& h : posterior.places) revisit += h.probability();
+  const double log_odds = terms.sum();
+  return revisit > 0 ? std::min(log_odds, std::log(revisit / posterior.elsewhere)) : log_odds;
+}
+
+/// Which candidate is the match. `middle`: the likeliest step, if there is one.
+std::optional<std::size_t> choose_match(std::optional<std::ptrdiff_t> middle,
+                                        std::ptrdiff_t num_steps, const KnownLoops& loops,
+                                        const PlaceFilter::Update& update) {
   using Observed = PlaceFilter::Observed;
+  const auto any = [](const Observed& /*o*/) { return true; };
   const auto ratio = [](const Observed& o) { return o.log_likelihood_ratio(); };
-  update.revisit = 1 - update.belief.elsewhere();
-  const auto middle = peak(update.belief);
-  if (!middle) {
-    update.match = best_of(
-        update.observed, [](const Observed& /*o*/) { return true; }, ratio);
-    return;
-  }
-  for (const PlaceFilter::Hypothesis& h : update.belief.places) {
-    if (is_near(h.step, *middle, loops)) update.probability += h.probability();
-  }
-  update.match = best_of(
-      update.observed, [&](const Observed& o) { return std::abs(o.step - *middle) <= kMatchSteps; },
-      [&](const Observed& o) {
-        // One place may show more than the next by chance.
-        const auto at = [&](std::ptrdiff_t step) { return update.belief.at(step); };
-        return at(o.step) + (at(o.step - 1) + at(o.step + 1)) / 2;
-      });
-  if (!update.match) {
-    update.match = best_of(
-        update.observed, [&](const Observed& o) { return is_near(o.step, *middle, loops); }, ratio);
-  }
+  if (!middle) return best_of(update.observed, any, ratio);
   // A place elsewhere that shows so much by itself that it needs no path shares the view, from
   // closer.
-  const double from_anywhere =
-      kReturn / (2 * static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps)));
-  const auto best = best_of(
-      update.observed, [](const Observed& /*o*/) { return true; },
-      [&](const Observed& o) {
-        return ratio(o) + std::log(std::max(update.prior.at(o.step), from_anywhere));
-      });
-  if (!best || is_near(update.observed[*best].step, *middle, loops)) return;
-  // No path speaks for it, so it is as probable as after a return from somewhere new.
-  const double odds = 2 * from_anywhere * std::exp(ratio(update.observed[*best]));
-  update.probability = std::min(update.revisit, odds / (1 + odds));
-  update.match = best;
+  const auto best = best_of(update.observed, any, [&](const Observed& o) {
+    return ratio(o) + std::log(std::max(update.prior.at(o.step), from_anywhere(num_steps) / 2));
+  });
+  if (!best || !PlaceFilter::is_near(update.observed[*best].step, *middle, loops)) return best;
+  return PlaceFilter::match_near(*middle, update.observed, update.belief, loops);
+}
+
+/// Why the match is as probable as it is.
+ScoreTerms explain(std::optional<std::ptrdiff_t> middle, const Posterior& posterior,
+                   std::ptrdiff_t num_steps, const KnownLoops& loops,
+                   const PlaceFilter::Observed& match) {
+  const double ratio = match.log_likelihood_ratio();
+  ScoreTerms terms{.votes = match.votes,
+                   .geometry = ratio - match.votes,
+                   .prior = std::log(from_anywhere(num_steps))};
+  double log_odds = middle && PlaceFilter::is_near(match.step, *middle, loops)
+                        ? log_odds_near(*middle, posterior, loops, terms)
+                        : log_odds_from_anywhere(posterior, terms);
+  // A path may end at any frame: one that speaks against its match is no loop.
+  if (ratio < 0) log_odds = less_probable(log_odds, ratio);
+  return with_path(terms, log_odds);
 }
 
 }  // namespace
 
-double PlaceFilter::Belief::elsewhere() const {
-  double sum = 0;
-  for (const Hypothesis& h : places) sum += h.probability();
-  return std::max(0.0, 1 - sum);
-}
-
-double PlaceFilter::Belief::at(std::ptrdiff_t step) const {
-  const auto found = std::ranges::lower_bound(places, step, {}, &Hypothesis::step);
-  return found != places.end() && found->step == step ? found->probability() : 0.0;
-}
-
 double PlaceFilter::Observed::log_likelihood_ratio() const {
-  return rounded(std::min(kMaxLogRatio, terms.votes + terms.geometry));
+  return rounded(std::min(kMaxLogRatio, votes + geometry));
 }
 
-PlaceFilter::Belief PlaceFilter::predict(bool is_step) const {
-  if (!is_step) return before_;
-  std::map<std::ptrdiff_t, Hypothesis> next;
-  for (const Hypothesis& h : belief_.places) {
-    const double forward = (1 - kLeave) * ((1 - kTurn) * h.forward + kTurn * h.backward);
-    const double backward = (1 - kLeave) * ((1 - kTurn) * h.backward + kTurn * h.forward);
-    for (std::size_t moved = 0; moved < kMoves.size(); ++moved) {
-      const auto steps = static_cast<std::ptrdiff_t>(moved);
-      next[h.step + steps].forward += kMoves[moved] * forward;
-      next[h.step - steps].backward += kMoves[moved] * backward;
-    }
-  }
-  Belief belief;
-  belief.places.reserve(next.size());
-  for (const auto& [step, h] : next) belief.places.push_back({step, h.forward, h.backward});
-  return belief;
+bool PlaceFilter::is_near(std::ptrdiff_t a, std::ptrdiff_t b, const KnownLoops& loops) {
+  return std::abs(a - b) <= kOnePathSteps ||
+         is_same_place({a, loops.first_visit(a)}, {b, loops.first_visit(b)});
+}
+
+double PlaceFilter::rounded(double value) {
+  constexpr double kScale = 1 << 30;
+  return std::round(value * kScale) / kScale;
+}
+
+std::optional<std::size_t> PlaceFilter::match_near(std::ptrdiff_t middle,
+                                                   const std::vector<Observed>& observed,
+                                                   const Belief& belief, const KnownLoops& loops) {
+  const auto match = best_of(
+      observed, [&](const Observed& o) { return std::abs(o.step - middle) <= kMatchSteps; },
+      [&](const Observed& o) {
+        // One place may show more than the next by chance.
+        return belief.at(o.step) + (belief.at(o.step - 1) + belief.at(o.step + 1)) / 2;
+      });
+  if (match) return match;
+  return best_of(
+      observed, [&](const Observed& o) { return is_near(o.step, middle, loops); },
+      [](const Observed& o) { return o.log_likelihood_ratio(); });
+}
+
+Belief PlaceFilter::predict(bool is_step) const {
+  return is_step ? one_step_later(belief_) : before_;
 }
 
 std::vector<std::ptrdiff_t> PlaceFilter::likeliest(const Belief& belief, double min_probability,
@@ -328,11 +309,11 @@ std::vector<PlaceFilter::Observed> PlaceFilter::observe(
   std::vector<Observed> observed;
   observed.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
-    Observed o{.step = verified[i].step, .sigmas = sigmas[i]};
-    if (num_similar >= kMinNull) o.terms.votes = votes_log_ratio(sigmas[i], num_similar);
+    Observed o{.candidate = verified[i].candidate, .step = verified[i].step, .sigmas = sigmas[i]};
+    if (num_similar >= kMinNull) o.votes = votes_log_ratio(sigmas[i], num_similar);
     if (verified[i].geometry) {
       o.evidence = verified[i].geometry->evidence();
-      o.terms.geometry = geometry_log_ratio(o.evidence, num_steps);
+      o.geometry = geometry_log_ratio(o.evidence, num_steps);
     }
     observed.push_back(o);
   }
@@ -347,7 +328,11 @@ PlaceFilter::Update PlaceFilter::update(
   update.observed = observe(verified, num_similar, num_steps);
   update.has_null = num_similar >= kMinNull;
   std::erase_if(prior.places, [&](const Hypothesis& h) { return !may_be_at(h.step); });
-  return_to(update.observed, num_steps, prior);
+  std::vector<std::ptrdiff_t> steps;
+  steps.reserve(update.observed.size());
+  for (const Observed& o : update.observed) steps.push_back(o.step);
+  update.returns = returns_to(std::move(steps), num_steps);
+  add_returns(update.returns, prior);
   share_among_laps(loops, prior.places);
 
   // Bayes: prior times likelihood ratio, against "somewhere new", whose ratio is 1.
@@ -365,17 +350,21 @@ PlaceFilter::Update PlaceFilter::update(
     h.forward /= sum;
     h.backward /= sum;
   }
-  std::erase_if(update.belief.places,
-                [](const Hypothesis& h) { return h.probability() < kMinProbability; });
+  double elsewhere = prior.elsewhere() / sum;
+  std::erase_if(update.belief.places, [&](const Hypothesis& h) {
+    const bool is_dropped = h.probability() < kMinProbability;
+    if (is_dropped) elsewhere += h.probability();
+    return is_dropped;
+  });
   update.prior = std::move(prior);
-  choose_match(num_steps, loops, update);
-  // A path may end at any frame: one that speaks against its match is no loop.
+  const auto middle = update.belief.peak();
+  update.match = choose_match(middle, num_steps, loops, update);
   if (update.match) {
-    const double ratio = update.observed[*update.match].log_likelihood_ratio();
-    update.probability *= std::min(1.0, std::exp(ratio));
+    update.terms = explain(middle, {update.belief.places, elsewhere}, num_steps, loops,
+                           update.observed[*update.match]);
+    update.probability = rounded(1 / (1 + std::exp(-update.terms.sum())));
   }
-  update.probability = rounded(update.probability);
-  update.revisit = rounded(update.revisit);
+  update.revisit = rounded(1 - update.belief.elsewhere());
   return update;
 }
 
@@ -392,7 +381,7 @@ PlaceFilter::Next PlaceFilter::prepare(Update update, bool is_step, const KnownL
 
 /// What is not near the likeliest place was wrong, as far as the robot is somewhere new.
 void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& next) const {
-  const auto middle = peak(update.belief);
+  const auto middle = update.belief.peak();
   std::vector<Observed> wrong = update.observed;
   if (middle && update.probability > 0.5) {
     std::erase_if(wrong, [&](const Observed& o) { return is_near(o.step, *middle, loops); });

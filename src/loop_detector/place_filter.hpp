@@ -9,8 +9,11 @@
 #include <utility>
 #include <vector>
 
+#include "loopbit/detection.hpp"
+
 #include "candidate_verifier.hpp"
 #include "known_loops.hpp"
+#include "path_motion.hpp"
 
 namespace loopbit {
 
@@ -28,33 +31,12 @@ namespace loopbit {
 /// the map.
 class PlaceFilter {
  public:
-  /// That the robot is at a step of the past, and moves along it forward or backward.
-  struct Hypothesis {
-    std::ptrdiff_t step = 0;
-    double forward = 0;
-    double backward = 0;
-
-    [[nodiscard]] double probability() const { return forward + backward; }
-  };
-
-  /// A probability for each of a few steps, in their order; the rest is somewhere new.
-  struct Belief {
-    std::vector<Hypothesis> places;
-
-    [[nodiscard]] double elsewhere() const;
-    [[nodiscard]] double at(std::ptrdiff_t step) const;
-  };
-
-  /// The terms of the log likelihood ratio of a candidate, in nats.
-  struct Terms {
-    double votes = 0;     ///< log likelihood ratio of its displacement votes
-    double geometry = 0;  ///< the same of its inliers
-  };
-
   /// A candidate of the frame, as the filter sees it.
   struct Observed {
+    Candidate candidate;
     std::ptrdiff_t step = 0;
-    Terms terms = {};
+    double votes = 0;     ///< log likelihood ratio of its displacement votes
+    double geometry = 0;  ///< the same of its inliers
     double sigmas = 0;    ///< votes in standard deviations of the null; 0 where there is no null
     double evidence = 0;  ///< CandidateGeometry::evidence, 0 if it was not looked at closer
 
@@ -63,13 +45,15 @@ class PlaceFilter {
 
   /// What one frame tells.
   struct Update {
-    Belief prior;   ///< before the frame was seen
-    Belief belief;  ///< after it
+    Belief prior;     ///< before the frame was seen
+    Belief belief;    ///< after it
+    Returns returns;  ///< of the prior
     std::vector<Observed> observed;
     /// Index of the candidate that shows the same place best, if any was observed there.
     std::optional<std::size_t> match;
     bool has_null = false;   ///< there were places enough to tell what votes mean
-    double probability = 0;  ///< that the match is right
+    ScoreTerms terms;        ///< of the log odds that the match is right, if there is one
+    double probability = 0;  ///< the same as a probability
     double revisit = 0;      ///< that any match is right
   };
 
@@ -83,6 +67,18 @@ class PlaceFilter {
     double excess;
     double count;
   };
+
+  /// Steps so close, or laps through one place, show the same place.
+  static bool is_near(std::ptrdiff_t a, std::ptrdiff_t b, const KnownLoops& loops);
+
+  /// Of the candidates that show the place at `middle`, the one that is the match.
+  static std::optional<std::size_t> match_near(std::ptrdiff_t middle,
+                                               const std::vector<Observed>& observed,
+                                               const Belief& belief, const KnownLoops& loops);
+
+  /// To about a billionth: mathematical functions may differ in the last bit between processors,
+  /// and answers must not.
+  static double rounded(double value);
 
   /// The frame to come, before it is seen. `is_step`: it changes the view; otherwise it stands for
   /// the last step.

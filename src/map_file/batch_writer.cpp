@@ -138,6 +138,13 @@ void BatchWriter::write(const AddedFrame& frame) {
   rows_->write(place, *frame.features);
   if (!frame.image.empty()) rows_->write_image(place, encode_image_(frame.image));
   if (detection.status == Status::loop) rows_->write(loop_of(detection, session_.session));
+  for (const LateLoop& late : detection.withdrawn_loops) {
+    const MapLoop loop = loop_of(late, session_.session);
+    reject_loop(*database_, loop.query, loop.match);
+  }
+  for (const LateLoop& late : detection.late_loops) {
+    rows_->write(loop_of(late, session_.session));
+  }
 }
 
 }  // namespace loopbit

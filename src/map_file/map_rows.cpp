@@ -374,6 +374,13 @@ MapLoop loop_of(const Detection& detection, int session) {
       .inliers = detection.inliers};
 }
 
+MapLoop loop_of(const LateLoop& loop, int session) {
+  return {.query = {session, loop.frame},
+          .match = loop.earlier_match.value_or(SessionFrame{session, loop.match.value_or(0)}),
+          .score = loop.score,
+          .similarity = loop.similarity};
+}
+
 FeatureReader::FeatureReader(const Database& database)
     : row_(database, "SELECT features, checksum FROM features WHERE place = ?1") {}
 

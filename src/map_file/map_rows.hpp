@@ -51,6 +51,7 @@ std::vector<MapLoop> read_rejected_loops(const Database& database, Damage& damag
 
 /// The loop of `session` that a detection, one of a loop, is.
 MapLoop loop_of(const Detection& detection, int session);
+MapLoop loop_of(const LateLoop& loop, int session);
 
 /// Reads features by place.
 class FeatureReader {

@@ -109,7 +109,9 @@ std::string detection_schema() {
                                              {"matches", integer},
                                              {"inliers", integer},
                                              {"times_ms", times}});
-  // Not every frame has one.
+  // Not every frame has them.
+  schema["properties"]["terms"] =
+      numbers("loopbit.ScoreTerms", {"votes", "geometry", "path", "rivals", "prior"});
   schema["properties"]["match"] = integer;
   schema["properties"]["earlier_session"] = integer;
   schema["properties"]["earlier_frame"] = integer;

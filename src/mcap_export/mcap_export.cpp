@@ -137,6 +137,13 @@ Json detection_json(const Detection& detection, double threshold, std::uint64_t 
               {"features", times.features_ms},
               {"verification", times.verification_ms},
               {"total", total_ms(times)}}}};
+  if (const auto& terms = detection.terms) {
+    json["terms"] = {{"votes", terms->votes},
+                     {"geometry", terms->geometry},
+                     {"path", terms->path},
+                     {"rivals", terms->rivals},
+                     {"prior", terms->prior}};
+  }
   if (detection.match) json["match"] = *detection.match;
   if (detection.earlier_match) {
     json["earlier_session"] = detection.earlier_match->session;

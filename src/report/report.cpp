@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <string_view>
@@ -187,6 +188,42 @@ Json earlier_matches(const std::vector<Detection>& detections) {
   });
 }
 
+/// What later frames changed: of each frame that changed something, a list of frame, match (a
+/// number, session and frame, or null), score and whether the loop was withdrawn; otherwise null.
+/// Null if none did.
+Json late_column(const std::vector<Detection>& detections) {
+  const auto changed = [](const Detection& d) {
+    return !d.late_loops.empty() || !d.withdrawn_loops.empty();
+  };
+  if (std::none_of(detections.begin(), detections.end(), changed)) return nullptr;
+  return column(detections, [&](const Detection& d) {
+    if (!changed(d)) return Json();
+    Json all = Json::array();
+    const auto add = [&](const LateLoop& loop, bool is_withdrawn) {
+      Json match = loop.match ? Json(*loop.match) : Json();
+      if (loop.earlier_match) match = {loop.earlier_match->session, loop.earlier_match->frame};
+      all.push_back({loop.frame, match, loop.score, is_withdrawn});
+    };
+    for (const LateLoop& loop : d.withdrawn_loops) add(loop, true);
+    for (const LateLoop& loop : d.late_loops) add(loop, false);
+    return all;
+  });
+}
+
+/// Null where a frame has none; shown with one decimal.
+Json terms_columns(const std::vector<Detection>& detections) {
+  const auto term = [&](double ScoreTerms::*member) {
+    return column(detections, [&](const Detection& d) {
+      return d.terms ? Json(std::round(*d.terms.*member * 100) / 100) : Json();
+    });
+  };
+  return {{"votes", term(&ScoreTerms::votes)},
+          {"geometry", term(&ScoreTerms::geometry)},
+          {"path", term(&ScoreTerms::path)},
+          {"rivals", term(&ScoreTerms::rivals)},
+          {"prior", term(&ScoreTerms::prior)}};
+}
+
 /// The columns of loops.csv that lists of other detectors lack.
 void add_own_columns(Json& json, const std::vector<Detection>& detections) {
   const auto time = [&](double StepTimes::*step) {
@@ -199,6 +236,8 @@ void add_own_columns(Json& json, const std::vector<Detection>& detections) {
       column(detections, [](const Detection& d) { return static_cast<int>(d.status); });
   json["earlier_match"] = earlier_matches(detections);
   json["score"] = column(detections, [](const Detection& d) { return d.score; });
+  json["late_loops"] = late_column(detections);
+  json["terms"] = terms_columns(detections);
   json["similarity"] = column(detections, [](const Detection& d) { return d.similarity; });
   json["matches"] = column(detections, [](const Detection& d) { return d.matches; });
   json["inliers"] = column(detections, [](const Detection& d) { return d.inliers; });
@@ -227,7 +266,8 @@ void add_match_columns(Json& json, const MatchList& list, int frames) {
     json["match"].push_back(match ? match->match : -1);
     json["score"].push_back(match ? Json(match->score) : Json());
   }
-  for (const char* name : {"earlier_match", "similarity", "matches", "inliers", "times_ms"}) {
+  for (const char* name :
+       {"earlier_match", "late_loops", "terms", "similarity", "matches", "inliers", "times_ms"}) {
     json[name] = nullptr;
   }
 }

@@ -112,35 +112,67 @@ Status status_from(const Row& row, std::size_t column) {
   return *found;
 }
 
-/// See match_cell() in run_folder.cpp.
-void read_match(const Row& row, std::size_t column, Detection& detection) {
+/// See match_cell() in run_folder.cpp. `Found`: a Detection or a LateLoop.
+template <typename Found>
+void read_match(const Row& row, std::size_t column, Found& found) {
   const std::string_view cell = row.cell(column);
   const auto colon = cell.find(':');
   if (colon == std::string_view::npos) {
-    detection.match = row.number_if_any<PlaceId>(column);
+    found.match = row.number_if_any<PlaceId>(column);
     return;
   }
-  detection.earlier_match = {.session = row.number_in<int>(cell.substr(0, colon), column),
-                             .frame = row.number_in<int>(cell.substr(colon + 1), column)};
+  found.earlier_match = {.session = row.number_in<int>(cell.substr(0, colon), column),
+                         .frame = row.number_in<int>(cell.substr(colon + 1), column)};
+}
+
+/// All of them or none.
+std::optional<ScoreTerms> terms_from(const Row& row, std::size_t column) {
+  if (row.cell(column).empty()) return std::nullopt;
+  return ScoreTerms{.votes = row.number<double>(column),
+                    .geometry = row.number<double>(column + 1),
+                    .path = row.number<double>(column + 2),
+                    .rivals = row.number<double>(column + 3),
+                    .prior = row.number<double>(column + 4)};
 }
 
 Detection detection_from(const Row& row) {
-  constexpr std::size_t kColumns = 14;
+  constexpr std::size_t kColumns = 19;
   row.check_columns(kColumns);
   Detection detection{.frame = row.number<PlaceId>(0),
                       .timestamp_s = row.number_if_any<double>(1),
                       .status = status_from(row, 2),
                       .score = row.number<double>(4),
+                      .terms = terms_from(row, 8),
                       .similarity = row.number<double>(5),
                       .matches = row.number<int>(6),
                       .inliers = row.number<int>(7),
-                      .times = {.content_ms = row.number<double>(10),
-                                .retrieval_ms = row.number<double>(11),
-                                .features_ms = row.number<double>(12),
-                                .verification_ms = row.number<double>(13)},
-                      .name = std::string(row.cell(8))};
+                      .times = {.content_ms = row.number<double>(15),
+                                .retrieval_ms = row.number<double>(16),
+                                .features_ms = row.number<double>(17),
+                                .verification_ms = row.number<double>(18)},
+                      .name = std::string(row.cell(13))};
   read_match(row, 3, detection);
   return detection;
+}
+
+/// Puts each late loop where it was reported. A run that was killed may have one more than it has
+/// frames.
+void read_late_loops(const std::string& path, std::vector<Detection>& detections) {
+  constexpr std::size_t kColumns = 8;
+  for_each_row(path, kLateLoopsHeader, [&](const Row& row) {
+    row.check_columns(kColumns);
+    LateLoop loop{.frame = row.number<PlaceId>(0),
+                  .score = row.number<double>(3),
+                  .similarity = row.number<double>(4)};
+    read_match(row, 2, loop);
+    const auto reported_at = row.number<std::size_t>(5);
+    if (static_cast<std::size_t>(loop.frame) >= reported_at) row.fail(5);
+    if (loop.match && *loop.match >= loop.frame) row.fail(2);
+    if (row.cell(1) != kLate && row.cell(1) != kWithdrawn) row.fail(1);
+    if (reported_at >= detections.size()) return;
+    Detection& by = detections[reported_at];
+    (row.cell(1) == kLate ? by.late_loops : by.withdrawn_loops).push_back(loop);
+  });
 }
 
 std::vector<std::optional<cv::Vec3d>> read_positions(const std::string& path, std::size_t frames) {
@@ -176,6 +208,9 @@ FinishedRun read_run(const std::string& path) {
   FinishedRun run;
   run.path = path;
   run.detections = read_detections((folder / kLoopsFile).string());
+  if (is_there(folder / kLateLoopsFile)) {
+    read_late_loops((folder / kLateLoopsFile).string(), run.detections);
+  }
   if (is_there(folder / kRecordFile)) {
     const std::string file = (folder / kRecordFile).string();
     run.record_json = read_text(file);
@@ -213,7 +248,17 @@ Scoring FinishedRun::scoring() const {
 MatchList match_list(const std::vector<Detection>& detections) {
   MatchList list;
   list.times_s.reserve(detections.size());
+  const auto add_changes = [&](const std::vector<LateLoop>& loops, bool is_loop) {
+    for (const LateLoop& loop : loops) {
+      list.changes.push_back({.query = loop.frame,
+                              .match = loop.match.value_or(-1),
+                              .score = loop.score,
+                              .is_loop = is_loop});
+    }
+  };
   for (const Detection& detection : detections) {
+    add_changes(detection.withdrawn_loops, false);
+    add_changes(detection.late_loops, true);
     list.times_s.push_back(detection.timestamp_s);
     const bool is_loop = detection.status == Status::loop;
     if (detection.earlier_match && is_loop) list.elsewhere.push_back(detection.frame);

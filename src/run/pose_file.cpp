@@ -37,14 +37,13 @@ std::string header() {
 }
 
 /// Cells of what is not known are empty.
-std::string csv_row(const Detection& detection, const RelativePose& pose) {
+std::string csv_row(PlaceId query, const std::string& match, const RelativePose& pose) {
   const bool is_known = pose.known != PoseKnown::nothing;
   std::string transform = is_known ? to_tum_pose(pose) : std::string(6, ' ');
   std::ranges::replace(transform, ' ', ',');
-  std::string row =
-      fmt::format("{},{},{},{},{},{},{},{}", detection.frame, match_cell(detection),
-                  to_string(pose.status), to_string(pose.known), transform, pose.matches,
-                  pose.inliers.size(), is_known ? fmt::format("{:.4f}", pose.rms_px) : "");
+  std::string row = fmt::format("{},{},{},{},{},{},{},{}", query, match, to_string(pose.status),
+                                to_string(pose.known), transform, pose.matches, pose.inliers.size(),
+                                is_known ? fmt::format("{:.4f}", pose.rms_px) : "");
   for_each_covariance(
       [&](int i, int j) { row += is_known ? fmt::format(",{:.9g}", pose.covariance(i, j)) : ","; });
   return row + '\n';
@@ -60,12 +59,20 @@ PoseFile::PoseFile(const std::string& folder, const CameraModel& camera)
 }
 
 void PoseFile::add(const Detection& detection, const LoopDetector& detector) {
+  for (const LateLoop& loop : detection.late_loops) add_loop(loop, detector);
   if (detection.status != Status::loop) return;
-  const Features query = detector.features_of({0, detection.frame});
-  const Features match = detector.features_of(
-      detection.earlier_match.value_or(SessionFrame{0, detection.match.value_or(0)}));
+  add_loop({.frame = detection.frame,
+            .match = detection.match,
+            .earlier_match = detection.earlier_match},
+           detector);
+}
+
+void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
+  const Features query = detector.features_of({0, loop.frame});
+  const Features match =
+      detector.features_of(loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}));
   if (query.working_size_px != match.working_size_px) return;
-  append(csv_row(detection,
+  append(csv_row(loop.frame, match_cell(loop),
                  estimator_.estimate({.query = {&query, &camera_}, .match = {&match, &camera_}})));
 }
 

@@ -18,12 +18,13 @@ class PoseFile {
   /// `camera`: of all images, with their size. Throws Error (kind output).
   PoseFile(const std::string& folder, const CameraModel& camera);
 
-  /// If `detection` is a loop, measures its pose and hands the row to the system. `detector` has
-  /// the features of both frames. Loops between images of different shapes are left out: they
+  /// Measures the poses of its loops, also late ones, and hands the rows to the system. `detector`
+  /// has the features of both frames. Loops between images of different shapes are left out: they
   /// cannot be from one camera. Throws Error (kind output), and what features_of() throws.
   void add(const Detection& detection, const LoopDetector& detector);
 
  private:
+  void add_loop(const LateLoop& loop, const LoopDetector& detector);
   void append(const std::string& row);
 
   std::string path_;

@@ -14,6 +14,7 @@ namespace loopbit {
 
 // The files of a run folder.
 inline constexpr const char* kLoopsFile = "loops.csv";
+inline constexpr const char* kLateLoopsFile = "late_loops.csv";
 inline constexpr const char* kRecordFile = "run.json";
 inline constexpr const char* kEvidenceFile = "evidence.db";
 inline constexpr const char* kTruthFile = "truth.csv";
@@ -34,6 +35,7 @@ inline bool is_there(const std::filesystem::path& file) {
 
 /// "17", or "2:17" for frame 17 of session 2 of the map; empty without a match.
 std::string match_cell(const Detection& detection);
+std::string match_cell(const LateLoop& loop);
 
 /// The text of run.json.
 std::string to_json(const RunRecord& record);

@@ -3,6 +3,8 @@
 #include "run_folder.hpp"
 
 #include <cerrno>
+#include <cstdint>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <system_error>
@@ -39,16 +41,40 @@ std::string name_cell(const std::string& name) {
   return cell;
 }
 
+std::string terms_cells(const std::optional<ScoreTerms>& terms) {
+  if (!terms) return ",,,,";
+  return fmt::format("{:.3f},{:.3f},{:.3f},{:.3f},{:.3f}", terms->votes, terms->geometry,
+                     terms->path, terms->rivals, terms->prior);
+}
+
 /// `before`: the detections of the frames before it.
 std::string csv_row(const Detection& d, const std::vector<Detection>& before) {
   const StepTimes& t = d.times;
   const auto match = static_cast<std::size_t>(d.match.value_or(d.frame));
   const std::string match_name = match < before.size() ? before[match].name : "";
-  return fmt::format("{},{},{},{},{},{:.6f},{},{},{},{},{:.3f},{:.3f},{:.3f},{:.3f}\n", d.frame,
+  return fmt::format("{},{},{},{},{},{:.6f},{},{},{},{},{},{:.3f},{:.3f},{:.3f},{:.3f}\n", d.frame,
                      d.timestamp_s ? fmt::format("{:.6f}", *d.timestamp_s) : "",
                      to_string(d.status), match_cell(d), d.score, d.similarity, d.matches,
-                     d.inliers, name_cell(d.name), name_cell(match_name), t.content_ms,
-                     t.retrieval_ms, t.features_ms, t.verification_ms);
+                     d.inliers, terms_cells(d.terms), name_cell(d.name), name_cell(match_name),
+                     t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
+}
+
+/// Rows of late_loops.csv. `detections`: all until this one.
+std::string late_rows(const Detection& detection, const std::vector<Detection>& detections) {
+  std::string text;
+  const auto add = [&](const std::vector<LateLoop>& loops, const char* kind) {
+    for (const LateLoop& loop : loops) {
+      const auto name_of = [&](std::optional<PlaceId> frame) {
+        return frame ? name_cell(detections.at(static_cast<std::size_t>(*frame)).name) : "";
+      };
+      text += fmt::format("{},{},{},{},{:.6f},{},{},{}\n", loop.frame, kind, match_cell(loop),
+                          loop.score, loop.similarity, detection.frame, name_of(loop.frame),
+                          name_of(loop.match));
+    }
+  };
+  add(detection.withdrawn_loops, kWithdrawn);
+  add(detection.late_loops, kLate);
+  return text;
 }
 
 std::string frame_list(const char* comment, const std::vector<int>& frames) {
@@ -107,7 +133,11 @@ RunResults run_results(const std::vector<Detection>& detections, double wall_s) 
                      .verification_ms = summarize(detections, &StepTimes::verification_ms),
                      .total_ms = summarize(detections, loopbit::total_ms),
                      .peak_memory_mib = peak_memory_mib()};
-  for (const Detection& d : detections) ++results.by_status[static_cast<std::size_t>(d.status)];
+  for (const Detection& d : detections) {
+    ++results.by_status[static_cast<std::size_t>(d.status)];
+    results.late_loops += static_cast<int>(d.late_loops.size());
+    results.withdrawn_loops += static_cast<int>(d.withdrawn_loops.size());
+  }
   if (wall_s > 0) results.frames_per_s = static_cast<double>(detections.size()) / wall_s;
   return results;
 }
@@ -115,39 +145,64 @@ RunResults run_results(const std::vector<Detection>& detections, double wall_s) 
 }  // namespace
 
 std::string match_cell(const Detection& detection) {
-  if (detection.earlier_match) {
-    return fmt::format("{}:{}", detection.earlier_match->session, detection.earlier_match->frame);
-  }
-  return detection.match ? fmt::format("{}", *detection.match) : "";
+  return match_cell(LateLoop{.match = detection.match, .earlier_match = detection.earlier_match});
 }
+
+std::string match_cell(const LateLoop& loop) {
+  if (loop.earlier_match) {
+    return fmt::format("{}:{}", loop.earlier_match->session, loop.earlier_match->frame);
+  }
+  return loop.match ? fmt::format("{}", *loop.match) : "";
+}
+
+/// A CSV file of whole rows.
+class RunFolder::Rows {
+ public:
+  Rows(const std::string& folder, const char* name, const char* header)
+      : path_((fs::path(folder) / name).string()), file_(std::fopen(path_.c_str(), "wx")) {
+    if (!file_) throw cannot_write(path_, errno);
+    std::setvbuf(file_.get(), nullptr, _IONBF, 0);
+    append(fmt::format("{}\n", header), 0);
+  }
+
+  /// `rows_before`: for the error.
+  void append(const std::string& rows, std::size_t rows_before) {
+    if (std::fwrite(rows.data(), 1, rows.size(), file_.get()) == rows.size()) {
+      bytes_ += static_cast<std::int64_t>(rows.size());
+      return;
+    }
+    const int reason = errno;
+    // What went to disk of a row that did not fit would be taken for a whole one.
+    const bool cut = ftruncate(fileno(file_.get()), bytes_) == 0;
+    throw cannot_write(path_, reason,
+                       cut ? fmt::format(" The {} rows before are kept.", rows_before)
+                           : " Its last row is incomplete.");
+  }
+
+ private:
+  struct CloseFile {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+
+  std::string path_;
+  std::unique_ptr<std::FILE, CloseFile> file_;  ///< unbuffered
+  std::int64_t bytes_ = 0;                      ///< of whole rows
+};
 
 RunFolder::RunFolder(const std::string& path, bool overwrite,
                      const std::vector<std::string>& inputs)
-    : path_(path), earlier_(std::make_unique<EarlierRun>(path, overwrite, inputs)) {
-  const fs::path loops = fs::path(path) / kLoopsFile;
-  loops_.reset(std::fopen(loops.c_str(), "wx"));
-  if (!loops_) throw cannot_write(loops.string(), errno);
-  std::setvbuf(loops_.get(), nullptr, _IONBF, 0);
-  append(fmt::format("{}\n", kLoopsHeader));
-}
-
-void RunFolder::append(const std::string& row) {
-  if (std::fwrite(row.data(), 1, row.size(), loops_.get()) == row.size()) {
-    loops_bytes_ += static_cast<std::int64_t>(row.size());
-    return;
-  }
-  const int reason = errno;
-  // What went to disk of a row that did not fit would be taken for a whole one.
-  const bool cut = ftruncate(fileno(loops_.get()), loops_bytes_) == 0;
-  throw cannot_write((fs::path(path_) / kLoopsFile).string(), reason,
-                     cut ? fmt::format(" The {} rows before are kept.", detections_.size())
-                         : " Its last row is incomplete.");
-}
+    : path_(path),
+      earlier_(std::make_unique<EarlierRun>(path, overwrite, inputs)),
+      loops_(std::make_unique<Rows>(path, kLoopsFile, kLoopsHeader)),
+      late_loops_(std::make_unique<Rows>(path, kLateLoopsFile, kLateLoopsHeader)) {}
 
 void RunFolder::add(const Detection& detection) {
-  append(csv_row(detection, detections_));
+  loops_->append(csv_row(detection, detections_), detections_.size());
   detections_.push_back(detection);
   earlier_->leave_aside();
+  const std::string late = late_rows(detection, detections_);
+  if (!late.empty()) late_loops_->append(late, late_rows_);
+  late_rows_ += detection.late_loops.size() + detection.withdrawn_loops.size();
 }
 
 void RunFolder::write_truth(const GroundTruth& truth) {

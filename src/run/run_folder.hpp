@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstdint>
-#include <cstdio>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,8 +18,8 @@ namespace loopbit {
 
 class EarlierRun;
 
-/// The folder of a run. loops.csv has one row per frame and is complete at any time. run.json is
-/// written when the run begins, and again when it ends.
+/// The folder of a run. loops.csv has one row per frame and is complete at any time, late_loops.csv
+/// has what later frames changed. run.json is written when the run begins, and again when it ends.
 class RunFolder {
  public:
   /// Makes the folder and begins loops.csv. Throws Error (kind output) if the folder holds an
@@ -56,23 +55,27 @@ class RunFolder {
   [[nodiscard]] std::string evidence_path() const;
 
  private:
-  void append(const std::string& row);
-
-  struct CloseFile {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
+  class Rows;
 
   std::string path_;
   std::unique_ptr<EarlierRun> earlier_;
-  std::unique_ptr<std::FILE, CloseFile> loops_;  ///< unbuffered
-  std::int64_t loops_bytes_ = 0;                 ///< of whole rows
+  std::unique_ptr<Rows> loops_;
+  std::unique_ptr<Rows> late_loops_;
+  std::size_t late_rows_ = 0;
   std::vector<Detection> detections_;
 };
 
 /// The header of loops.csv, without a line end.
 inline constexpr const char* kLoopsHeader =
-    "frame,timestamp,status,match,score,similarity,matches,inliers,name,match_name,"
+    "frame,timestamp,status,match,score,similarity,matches,inliers,"
+    "votes,geometry,path,rivals,prior,name,match_name,"
     "content_ms,retrieval_ms,features_ms,verification_ms";
+
+/// The header of late_loops.csv, without a line end, and its kinds.
+inline constexpr const char* kLateLoopsHeader =
+    "frame,kind,match,score,similarity,reported_at,name,match_name";
+inline constexpr const char* kLate = "late";
+inline constexpr const char* kWithdrawn = "withdrawn";
 
 /// The header of positions.csv, without a line end.
 inline constexpr const char* kPositionsHeader = "frame,x_m,y_m,z_m";

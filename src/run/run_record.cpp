@@ -46,6 +46,8 @@ void transfer_results(Io& io, Record& record, Results& results) {
   for (std::size_t i = 0; i < kAllStatuses.size(); ++i) {
     io(fmt::format("/counts/by_status/{}", to_string(kAllStatuses[i])), results.by_status[i]);
   }
+  io("/counts/late_loops", results.late_loops);
+  io("/counts/withdrawn_loops", results.withdrawn_loops);
   transfer_times(io, "/times_ms/content", results.content_ms);
   transfer_times(io, "/times_ms/retrieval", results.retrieval_ms);
   transfer_times(io, "/times_ms/features", results.features_ms);

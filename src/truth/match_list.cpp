@@ -142,6 +142,25 @@ class Reader {
 
 }  // namespace
 
+MatchList with_changes(MatchList list) {
+  for (const ReportedMatch& change : list.changes) {
+    const auto is_changed = [&](const ReportedMatch& match) {
+      return match.query == change.query && match.match == change.match;
+    };
+    if (change.match < 0 && change.is_loop) {
+      list.elsewhere.push_back(change.query);
+    } else if (change.match < 0) {
+      std::erase(list.elsewhere, change.query);
+    } else if (change.is_loop) {
+      list.matches.push_back(change);
+    } else {
+      for (ReportedMatch& match : list.matches) match.is_loop &= !is_changed(match);
+    }
+  }
+  list.changes.clear();
+  return list;
+}
+
 MatchList read_match_list(const std::string& path) {
   const std::vector<TextRow> rows = read_rows(path);
   if (rows.empty()) return {};

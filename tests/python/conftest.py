@@ -94,4 +94,6 @@ def as_row(detection):
         "similarity": f"{detection.similarity:.6f}",
         "matches": str(detection.matches),
         "inliers": str(detection.inliers),
+        **{name: "" if detection.terms is None else f"{getattr(detection.terms, name):.3f}"
+           for name in ("votes", "geometry", "path", "rivals", "prior")},
     }

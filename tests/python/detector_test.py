@@ -60,6 +60,33 @@ def test_detection(images):
     assert detector.skip().status.name == "unreadable" and len(detector) == 91
 
 
+def test_late_loops_are_of_frames_that_were_none(images):
+    options = loopbit.LoopDetectorOptions()
+    options.decision.min_score = 0.9999    # the path needs some frames to become sure
+    detector = loopbit.LoopDetector(options)
+    found = [detector.process(image) for image in images]
+    late = [(loop, d) for d in found for loop in d.late_loops]
+    assert late and len({loop.frame for loop, _ in late}) == len(late)
+    for loop, d in late:
+        assert loop.frame < d.frame and not found[loop.frame].is_loop
+        assert loop.match == pytest.approx(loop.frame - 60, abs=4) and loop.earlier_match is None
+        assert loop.score >= 0.9999 and 0 < loop.similarity < 1
+    loop = late[0][0]
+    assert repr(loop) == f"LateLoop(frame={loop.frame}, match={loop.match}, score={loop.score:.4f})"
+    assert all(d.withdrawn_loops == [] for d in found)
+
+
+def test_the_terms_add_up_to_the_score(images):
+    detector = loopbit.LoopDetector()
+    assert detector.process(images[0]).terms is None
+    for image in images[1:80]:
+        found = detector.process(image)
+    terms = found.terms
+    log_odds = terms.votes + terms.geometry + terms.path + terms.rivals + terms.prior
+    assert found.score == pytest.approx(1 / (1 + np.exp(-log_odds)), abs=1e-6)
+    assert repr(terms).startswith("ScoreTerms(votes=")
+
+
 def test_allowed_places(images):
     detector = loopbit.LoopDetector()
     for image in images[:80]:

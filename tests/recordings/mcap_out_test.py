@@ -50,6 +50,9 @@ def test_detections_are_those_of_loops_csv(town):
         assert detection["is_loop"] == (row["status"] == "loop")
         assert detection["score"] == pytest.approx(float(row["score"]), abs=1e-6)
         assert detection["inliers"] == int(row["inliers"])
+        for name, term in detection.get("terms", {}).items():
+            assert term == pytest.approx(float(row[name]), abs=1e-3)
+        assert ("terms" in detection) == (row["match"] != "")
         assert str(detection.get("match", "")) == row["match"]
     times = [int(each["time_ns"]) for each in read["messages"]]
     assert times == sorted(times)

@@ -283,6 +283,39 @@ const misdrawn = () => {
   return [...stretched, ...outside];
 };
 
+/** The terms are those of the frame, and their sum is the log odds of its score. */
+async function checkTerms(page, run, frame) {
+  const terms = ["votes", "geometry", "path", "rivals", "prior"].map((n) => run.terms?.[n][frame]);
+  const shown = page.locator("[data-key='pair.terms']");
+  if (terms.some((term) => typeof term !== "number")) {
+    assert.equal(await shown.count(), 0, `terms of ${frame}`);
+    return;
+  }
+  const text = (await textOf(page, "pair.terms")).replaceAll("−", "-");
+  const numbers = text.replaceAll("- ", "-").match(/-?[a-z]* ?-?\d+\.\d/g);
+  const values = numbers.map((word) => Number(word.replace(/[a-z ]/g, "")));
+  const sum = terms.reduce((a, b) => a + b, 0);
+  [sum, ...terms].forEach((value, i) => {
+    assert.ok(Math.abs(values[i] - value) <= 0.0501, `term ${i} of ${frame}: ${text}`);
+  });
+  const score = 1 / (1 + Math.exp(-sum));
+  assert.ok(Math.abs(score - run.score[frame]) < 0.01, `terms of ${frame}: ${text}`);
+}
+
+/** Late and withdrawn loops of the frame are told, with the frame that changed them. */
+async function checkChanges(page, run, frame) {
+  const texts = await page.locator("[data-key='pair.change']").allTextContents();
+  const changes = (run.late_loops ?? []).flatMap((loops, by) =>
+    (loops ?? []).filter((loop) => loop[0] === frame).map((loop) => [by, ...loop]),
+  );
+  assert.equal(texts.length, changes.length, `changes of ${frame}: ${texts}`);
+  changes.forEach(([by, , match, , isWithdrawn], i) => {
+    assert.equal(texts[i].includes("withdrew"), isWithdrawn, texts[i]);
+    assert.match(texts[i], new RegExp(`with ${[match].flat().join(":")}:`));
+    assert.match(texts[i], new RegExp(`rame ${by} `));
+  });
+}
+
 /** Of some pairs all that the pair browser says; of fewer, if `isBrief`. */
 export async function checkPairs(page, isBrief) {
   const run = (await embedded(page)).runs[0];
@@ -291,7 +324,11 @@ export async function checkPairs(page, isBrief) {
   const close = others.filter((frame) => Math.abs(run.score[frame] - run.threshold) < 0.01);
   let compared = 0;
   const [some, few, one] = isBrief ? [5, 2, 1] : [12, 6, 2];
-  for (const frame of [...spread(loops, some), ...spread(others, few), ...spread(close, one)]) {
+  const changed = [
+    ...new Set((run.late_loops ?? []).flat().flatMap((loop) => (loop ? [loop[0]] : []))),
+  ];
+  const frames = [...spread(loops, some), ...spread(others, few), ...spread(close, one)];
+  for (const frame of [...frames, ...spread(changed, few)]) {
     await goTo(page, frame);
     const match = run.match[frame];
     await checkTag(page, run, frame);
@@ -305,6 +342,8 @@ export async function checkPairs(page, isBrief) {
       if (run[name])
         assertShows(await textOf(page, `pair.${name}`), run[name][frame], `${name} of ${frame}`);
     }
+    await checkTerms(page, run, frame);
+    await checkChanges(page, run, frame);
     const pictures = [run.pictures[frame], run.pictures[match]];
     const shown = await page.$$eval(
       "#pair .picture img",

@@ -106,6 +106,34 @@ function detect(places, quality, options, next) {
   return columns;
 }
 
+/** Frames that change the decision of the one before: a late loop, or one that is withdrawn. */
+function lateOf({ match, status, score }) {
+  const isLoop = (frame) => status[frame] === statusOf("loop");
+  let found = false;
+  const all = match.map((_, by) => {
+    const frame = by - 1;
+    if (frame < 0 || match[frame] < 0 || frame % 11 !== 3) return null;
+    found = true;
+    return [
+      [frame, match[frame], isLoop(frame) ? 0.25 : Math.max(0.985, score[frame]), isLoop(frame)],
+    ];
+  });
+  return found ? all : null;
+}
+
+/** Terms whose sum is the log odds of the score. */
+function termsOf({ match, score }) {
+  const of = (term) => score.map((value, i) => (match[i] < 0 ? null : round(term(value), 2)));
+  const logOdds = (value) => Math.log(Math.max(value, 1e-6) / Math.max(1 - value, 1e-6));
+  return {
+    votes: of((value) => 0.4 * logOdds(value)),
+    geometry: of((value) => 0.6 * logOdds(value) + 3),
+    path: of(() => 7),
+    rivals: of(() => -0.5),
+    prior: of(() => -9.5),
+  };
+}
+
 /** The later half of the run is in a place that an earlier session of the map knows. */
 function sendElsewhere(columns) {
   columns.earlier_match = columns.match.map(() => null);
@@ -402,6 +430,8 @@ function runOf(places, index, options) {
     score: isExternal
       ? columns.score.map((score, frame) => (columns.match[frame] < 0 ? null : score))
       : columns.score,
+    late_loops: isExternal ? null : lateOf(columns),
+    terms: isExternal ? null : termsOf(columns),
     similarity: isExternal
       ? null
       : columns.match.map((match, frame) => round(similarityOf(match, frame), 6)),

@@ -69,7 +69,10 @@ struct CurvePoint {
 struct Evaluation {
   EvaluationOptions options;
   DecisionCounts decision;  ///< with the detector's own threshold
-  PairCounts pairs;         ///< with the detector's own threshold
+  /// The same with loops that were found late, and without those that were withdrawn; see
+  /// MatchList::changes.
+  DecisionCounts late;
+  PairCounts pairs;  ///< with the detector's own threshold
   /// One point per distinct score, from the highest. Equal scores are accepted together.
   std::vector<CurvePoint> curve;
   double recall_at_full_precision = 0;

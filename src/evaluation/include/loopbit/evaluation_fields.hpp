@@ -25,6 +25,12 @@ void transfer_evaluation(Io& io, const std::string& place, Scored& scored) {
   io.derived(place + "/recall", decision.recall());
   io.derived(place + "/precision", decision.precision());
   io.derived(place + "/precision_interval", std::array{interval.low, interval.high});
+  io(place + "/late/positives", scored.late.positives);
+  io(place + "/late/right", scored.late.right);
+  io(place + "/late/tolerated", scored.late.tolerated);
+  io(place + "/late/wrong", scored.late.wrong);
+  io.derived(place + "/late/recall", scored.late.recall());
+  io.derived(place + "/late/precision", scored.late.precision());
   io(place + "/recall_at_full_precision", scored.recall_at_full_precision);
   io.or_null(place + "/score_at_full_precision", scored.score_at_full_precision);
   io(place + "/average_precision", scored.average_precision);

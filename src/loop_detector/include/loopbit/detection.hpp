@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "loopbit/place_index.hpp"
 
@@ -38,12 +39,33 @@ struct StepTimes {
   double verification_ms = 0;  ///< step 3, matching, geometry and decision
 };
 
+/// Why a score is what it is: the terms of the log odds of the match, in nats. With their sum S the
+/// score is 1 / (1 + exp(-S)). docs/method.md, section 4, has the formulas.
+struct ScoreTerms {
+  double votes = 0;     ///< features of frame and match that moved alike, against other places
+  double geometry = 0;  ///< distinct inliers, against those of wrong places
+  double path = 0;      ///< the frames before, and the steps beside the match in this frame
+  double rivals = 0;    ///< places elsewhere that share the evidence; never above 0
+  double prior = 0;     ///< that a robot returns to this place of all; never above 0
+
+  [[nodiscard]] double sum() const { return votes + geometry + path + rivals + prior; }
+};
+
 /// A frame of one of a map's sessions.
 struct SessionFrame {
   int session = 0;  ///< from 1, in the order in which they were recorded
   int frame = 0;    ///< frame number in the session, from 0
 
   bool operator==(const SessionFrame&) const = default;
+};
+
+/// A loop of an earlier frame that a later one found, or withdrew.
+struct LateLoop {
+  PlaceId frame = 0;                                         ///< of this session
+  std::optional<PlaceId> match = std::nullopt;               ///< as in Detection
+  std::optional<SessionFrame> earlier_match = std::nullopt;  ///< as in Detection
+  double score = 0;       ///< the probability that it is right, by all frames until now
+  double similarity = 0;  ///< xi of frame and match
 };
 
 /// The answer for one frame, with the numbers behind it.
@@ -54,12 +76,18 @@ struct Detection {
   std::optional<PlaceId> match =
       std::nullopt;  ///< the best candidate, accepted or not, if it is a frame of this session
   std::optional<SessionFrame> earlier_match =
-      std::nullopt;       ///< the same, if it belongs to an earlier session of the map
-  double score = 0;       ///< what was compared with decision.min_score
+      std::nullopt;  ///< the same, if it belongs to an earlier session of the map
+  double score = 0;  ///< what was compared with decision.min_score
+  std::optional<ScoreTerms> terms =
+      std::nullopt;       ///< of the score; none without a match or with decision.count_matches
   double similarity = 0;  ///< xi of query and match
   int matches = 0;        ///< one-to-one feature matches between query and match
   int inliers = 0;        ///< matches that fit one epipolar geometry
   StepTimes times = {};
+  /// Loops of the last few views, which this frame made sure: their frames had none. In order.
+  std::vector<LateLoop> late_loops = {};
+  /// Loops reported before, also late ones, that are more likely wrong than right after this frame.
+  std::vector<LateLoop> withdrawn_loops = {};
   std::string name = {};  ///< of the image in its source; run() sets it
 };
 

@@ -15,6 +15,9 @@ export const share = (value: number | null): string =>
 
 export const similarity = share;
 
+/** Of log odds. */
+export const term = (value: number): string => value.toFixed(1).replace("-", "−");
+
 /**
  * Scores are probabilities as a rule, and near 0 and near 1 stay told from these: 0.99996 is not
  * shown as 1. Another detector's may be anything.

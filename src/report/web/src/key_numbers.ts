@@ -92,6 +92,10 @@ function notesOf(model: RunModel): string[] {
   return [
     ...(frames_known ? [`${share.toFixed(1)} % of frames`] : []),
     ...(revisits.length > 0 ? [format.counted(revisits.length, "revisit")] : []),
+    ...(model.countChanges(false) > 0 ? [`${format.count(model.countChanges(false))} late`] : []),
+    ...(model.countChanges(true) > 0
+      ? [`${format.count(model.countChanges(true))} withdrawn`]
+      : []),
   ];
 }
 

@@ -4,6 +4,7 @@
 import { type Child, html } from "./dom.ts";
 import * as format from "./format.ts";
 import { candidateName } from "./partner.ts";
+import type { ScoreTerms } from "./report_data.ts";
 import type { RunModel } from "./run_model.ts";
 import { meaningOfLoop, meaningOfStatus, nameOfStatus } from "./status_text.ts";
 import type { Selection } from "./store.ts";
@@ -11,6 +12,39 @@ import { markIcon, nameOf } from "./verdicts.ts";
 
 function fact(name: string, key: string, ...value: Child[]): HTMLElement {
   return html("div", {}, html("dt", {}, name), html("dd", { "data-key": `pair.${key}` }, ...value));
+}
+
+const kTerms: readonly (keyof ScoreTerms)[] = ["votes", "geometry", "path", "rivals", "prior"];
+
+/** Why the score is what it is; null if the detector does not say. */
+function termsOf({ run }: RunModel, frame: number): HTMLElement | null {
+  const terms = kTerms.flatMap((name) => {
+    const value = run.terms?.[name][frame] ?? null;
+    return value === null ? [] : [{ name, value }];
+  });
+  if (terms.length < kTerms.length) return null;
+  const sum = terms.reduce((all, { value }) => all + value, 0);
+  const added = terms.map(({ name, value }, i) => {
+    const sign = value < 0 ? "−" : "+";
+    return `${i === 0 && value >= 0 ? "" : `${sign} `}${name} ${format.term(Math.abs(value))}`;
+  });
+  const title = "Terms of the log odds that the match is right, in nats; see the method's page";
+  return html(
+    "p",
+    { class: "terms", "data-key": "pair.terms", title },
+    `log odds ${format.term(sum)} = ${added.join(" ")}`,
+  );
+}
+
+/** What later frames changed of the decision. */
+function changesOf(model: RunModel, frame: number): HTMLElement[] {
+  return model.changes(frame).map((change) => {
+    const score = format.score(change.score, model.run.threshold);
+    const text = change.isWithdrawn
+      ? `Frame ${change.by} withdrew its loop with ${change.matchName}: only ${score} by then.`
+      : `A late loop with ${change.matchName}: ${score} from frame ${change.by} on.`;
+    return html("p", { class: "terms", "data-key": "pair.change" }, text);
+  });
 }
 
 /** The decision for the frame, and the numbers of its best candidate. */
@@ -69,7 +103,9 @@ export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] 
   if (model.totals_ms && model.isReadable(frame)) {
     facts.append(fact("took", "took", `${format.milliseconds(model.totals_ms[frame] ?? 0)} ms`));
   }
-  if (model.isWithCandidate(selection) || !has) return [line, why, facts];
+  const terms = termsOf(model, frame);
+  const shown = [line, why, facts, ...(terms ? [terms] : []), ...changesOf(model, frame)];
+  if (model.isWithCandidate(selection) || !has) return shown;
   const whose = `Values of its ${candidateName(model, frame)}, which is not shown:`;
-  return [html("p", { class: "whose", "data-key": "pair.whose" }, whose), line, why, facts];
+  return [html("p", { class: "whose", "data-key": "pair.whose" }, whose), ...shown];
 }

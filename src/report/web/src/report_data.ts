@@ -55,6 +55,10 @@ export interface Run {
   earlier_match: ([session: number, frame: number] | null)[] | null;
   /** Null if the detector reports nothing for a frame. */
   score: (number | null)[];
+  /** What a frame changed of earlier ones; null for frames that changed nothing. */
+  late_loops: (LateLoop[] | null)[] | null;
+  /** Of the log odds of the score; null if the detector does not report them. */
+  terms: ScoreTerms | null;
   /** Null if the detector does not report them. */
   similarity: number[] | null;
   matches: number[] | null;
@@ -78,6 +82,24 @@ export interface Run {
   /** By frame number. Not every frame has one: the report has a size budget, which the first
    * frame, wrong loops and the weakest loops use before others. */
   pictures: Record<string, Picture>;
+}
+
+/** A loop of an earlier frame that a later one found, or withdrew. The match is a frame of this
+ * run, or session and frame of an earlier session of the map. */
+export type LateLoop = [
+  frame: number,
+  match: number | [session: number, frame: number],
+  score: number,
+  isWithdrawn: boolean,
+];
+
+/** In nats; null for frames without a match. */
+export interface ScoreTerms {
+  votes: (number | null)[];
+  geometry: (number | null)[];
+  path: (number | null)[];
+  rivals: (number | null)[];
+  prior: (number | null)[];
 }
 
 export interface StepTimes {

@@ -29,6 +29,18 @@ const kLongRevisit = 3;
 /** How far a loop of a revisit may lie from its ends, in frames; see revisits.hpp. */
 const kReach = 20;
 
+/** What a later frame changed of a frame's decision. */
+export interface Change {
+  /** As loops.csv writes it. */
+  matchName: string;
+  /** Null if the match is in an earlier session of the map. */
+  match: number | null;
+  score: number;
+  isWithdrawn: boolean;
+  /** The later frame. */
+  by: number;
+}
+
 type Span = readonly [first: number, last: number];
 
 /** A frame of an earlier session of the map. */
@@ -46,6 +58,7 @@ export class RunModel {
   private readonly truth = new Map<number, Span[]>();
   private readonly members = new Map<Filter, readonly number[]>();
   private readonly marked = new Map<Marked, readonly number[]>();
+  private changed: ReadonlyMap<number, readonly Change[]>;
 
   private size: number;
 
@@ -55,6 +68,7 @@ export class RunModel {
     readonly isLive = false,
   ) {
     this.totals_ms = totals(run);
+    this.changed = changesOf(run);
     this.size = run.frames;
     this.longRevisits = run.revisits.filter(({ loops }) => loops >= kLongRevisit);
     const triples = run.truth?.same_place ?? [];
@@ -79,6 +93,7 @@ export class RunModel {
   grow(): void {
     this.size = this.run.frames;
     this.totals_ms = totals(this.run);
+    this.changed = changesOf(this.run);
     this.members.clear();
     this.marked.clear();
   }
@@ -176,6 +191,25 @@ export class RunModel {
     if (earlier) return `${earlier.session}:${earlier.frame}`;
     const match = this.match(frame);
     return match === null ? null : String(match);
+  }
+
+  /** What later frames changed of a frame's decision, in order. */
+  changes(frame: number): readonly Change[] {
+    return this.changed.get(frame) ?? [];
+  }
+
+  /** The late loops with a frame of this run that were not withdrawn, as pairs. */
+  lateLoops(): [frame: number, match: number][] {
+    return [...this.changed].flatMap(([frame, changes]): [number, number][] => {
+      const last = changes.at(-1);
+      return last && !last.isWithdrawn && last.match !== null ? [[frame, last.match]] : [];
+    });
+  }
+
+  /** How many loops were found late, or withdrawn. */
+  countChanges(isWithdrawn: boolean): number {
+    const all = [...this.changed.values()].flat();
+    return all.filter((change) => change.isWithdrawn === isWithdrawn).length;
   }
 
   trueSpans(frame: number): readonly Span[] {
@@ -302,6 +336,19 @@ export class RunModel {
     const mean = sorted.reduce((sum, time) => sum + time, 0) / Math.max(1, sorted.length);
     return { mean, p50: quantile(0.5), p99: quantile(0.99), max: quantile(1) };
   }
+}
+
+function changesOf({ late_loops }: Run): Map<number, Change[]> {
+  const changes = new Map<number, Change[]>();
+  for (const [by, loops] of (late_loops ?? []).entries()) {
+    for (const [frame, to, score, isWithdrawn] of loops ?? []) {
+      const match = typeof to === "number" ? to : null;
+      const matchName = typeof to === "number" ? String(to) : to.join(":");
+      const change = { match, matchName, score, isWithdrawn, by };
+      changes.set(frame, [...(changes.get(frame) ?? []), change]);
+    }
+  }
+  return changes;
 }
 
 function totals(run: Run): number[] | null {

@@ -88,6 +88,7 @@ export class Trajectory implements View {
         " A loop into another session has no line, because its match is not one of these frames.",
       );
     }
+    if (model.lateLoops().length > 0) this.caption.append(" Dashed lines are late loops.");
     this.element.classList.toggle("ring", this.isRing);
     this.legend.show(model);
     this.listRevisits(model);
@@ -145,6 +146,7 @@ export class Trajectory implements View {
     for (const verdict of kMarked) {
       this.drawLoops(ctx, to, theme, verdict, count);
     }
+    this.drawLateLoops(ctx, to, theme, count);
     for (const verdict of kMarked) {
       const points: Point[] = [];
       for (const frame of model.framesMarked(verdict)) {
@@ -190,6 +192,20 @@ export class Trajectory implements View {
     ctx.lineWidth = (verdict === "wrong" ? 1.5 : 1.1) * to.ratio;
     ctx.stroke(path);
     ctx.globalAlpha = 1;
+  }
+
+  private drawLateLoops(ctx: Pen, to: Projection, theme: Theme, count: number): void {
+    const path = new Path();
+    for (const [frame, matched] of this.store.model.lateLoops()) {
+      const from = this.places[frame];
+      const match = this.places[matched];
+      if (from && match) this.addLink(path, to, from, match, count);
+    }
+    ctx.strokeStyle = theme.loop;
+    ctx.lineWidth = 1.1 * to.ratio;
+    ctx.setLineDash([4 * to.ratio, 3 * to.ratio]);
+    ctx.stroke(path);
+    ctx.setLineDash([]);
   }
 
   /** Long revisits as bands from their queries to their matches. */

@@ -39,6 +39,8 @@ struct Machine {
 struct RunResults {
   int frames = 0;
   std::array<int, kAllStatuses.size()> by_status{};  ///< frames, in the order of kAllStatuses
+  int late_loops = 0;
+  int withdrawn_loops = 0;
   TimeSummary content_ms, retrieval_ms, features_ms, verification_ms, total_ms;
   double frames_per_s = 0;
   double peak_memory_mib = 0;

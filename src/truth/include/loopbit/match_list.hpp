@@ -25,7 +25,13 @@ struct MatchList {
   FrameTimes times_s = {};                  ///< empty if frames are not listed
   /// Queries whose accepted match is in another recording, which truth does not cover.
   std::vector<int> elsewhere = {};
+  /// What later frames changed of the decisions, in order: is_loop = a loop found late, otherwise
+  /// one that was withdrawn. `match` is -1 in another recording.
+  std::vector<ReportedMatch> changes = {};
 };
+
+/// The list with its changes made, and none left.
+MatchList with_changes(MatchList list);
 
 /// Reads a CSV file of matches. A header row names the columns: `query` or `frame`, `match`,
 /// `score`, and in loopbit's loops.csv `status` (`loop` = accepted; other rows with a match are

@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+namespace loopbit {
+
+/// That the robot is at a step of the past, and moves along it forward or backward.
+struct Hypothesis {
+  std::ptrdiff_t step = 0;
+  double forward = 0;
+  double backward = 0;
+
+  [[nodiscard]] double probability() const { return forward + backward; }
+};
+
+/// A probability for each of a few steps, in their order; the rest is somewhere new.
+struct Belief {
+  std::vector<Hypothesis> places;
+
+  [[nodiscard]] double elsewhere() const;
+  [[nodiscard]] double at(std::ptrdiff_t step) const;
+  /// The step with most probability.
+  [[nodiscard]] std::optional<std::ptrdiff_t> peak() const;
+};
+
+/// The places that a robot elsewhere may return to at a step, and with which probability to each,
+/// in either direction.
+struct Returns {
+  std::vector<std::ptrdiff_t> steps;  ///< in order
+  double probability = 0;
+};
+
+/// The hypothesis of a step, which is inserted if there is none. `places`: in the order of steps.
+Hypothesis& hypothesis_at(std::vector<Hypothesis>& places, std::ptrdiff_t step);
+
+// How a robot moves: it follows an earlier path forward or backward at up to two steps per step,
+// turns round on it, leaves it, or returns anywhere. docs/method.md, section 4, has the model.
+
+/// `num_steps`: how many there are to return to. `steps`: those that were looked at.
+Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps);
+
+/// That a robot which returns does so to a certain one of `num_steps` steps.
+double from_anywhere(std::ptrdiff_t num_steps);
+
+/// Where the robot is one step later, if it follows a path.
+Belief one_step_later(const Belief& belief);
+
+/// Adds what a robot elsewhere may return to.
+void add_returns(const Returns& returns, Belief& belief);
+
+/// The reverse: where the robot was at a step, from what is known one step later. `belief`: after
+/// the step's frame. `prior`: predicted from it for one step later. `later`: after all frames.
+/// Rauch, Tung and Striebel's smoother (1965) for discrete states.
+Belief one_step_earlier(const Belief& belief, const Belief& prior, const Returns& returns,
+                        const Belief& later);
+
+}  // namespace loopbit
