@@ -78,9 +78,11 @@ export async function checkTruePlace(page) {
     all.map((one) => one.alt ?? one.getAttribute("aria-label")),
   );
   assert.ok(!names.some((name) => /match|candidate/.test(name)), `maps are called ${names}`);
-  if (run.inliers && run.match[missed] >= 0) {
+  const earlier = run.earlier_match?.[missed];
+  if (run.inliers && (earlier || run.match[missed] >= 0)) {
     const whose = await textOf(page, "pair.whose");
-    assert.match(whose, new RegExp(` ${run.match[missed]}, which is not shown`), "whose numbers");
+    const candidate = earlier?.join(":") ?? run.match[missed];
+    assert.match(whose, new RegExp(` ${candidate}, which is not shown`), "whose numbers");
     assertShows(await textOf(page, "pair.inliers"), run.inliers[missed], "the match's inliers");
   } else {
     assert.equal(await textOf(page, "pair.inliers"), "–", "inliers of nothing");
