@@ -3,7 +3,6 @@
 // Loops between sessions that never met.
 #include <functional>
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -186,22 +185,18 @@ TEST_F(RealMapLink, TwoWalksThroughACorridor) {
     const auto map = std::make_shared<MapWriter>(path(name), LoopDetectorOptions{}, name);
     LoopDetector detector(LoopDetectorOptions{}, map);
     Frame frame;
-    std::set<int> late;
     for (int i = 0; i <= last && source->next(frame); ++i) {
-      if (i < first) continue;
-      for (const LateLoop& loop : detector.process(frame.image).late_loops) late.insert(loop.frame);
+      if (i >= first) detector.process(frame.image);
     }
     map->finish();
-    return late;
   };
   walk("first.db", 0, 41);
   walk("second.db", 42, 83);
   merge_map(path("merged.db"), path("first.db"));
   merge_map(path("merged.db"), path("second.db"));
   EXPECT_EQ(link_map(path("merged.db")).places, 42);
-  const std::set<int> late = walk("first.db", 42, 83);
-  std::vector<MapLoop> expected = loops_between("first.db");
-  std::erase_if(expected, [&](const MapLoop& loop) { return late.contains(loop.query.frame); });
+  walk("first.db", 42, 83);
+  const std::vector<MapLoop> expected = loops_between("first.db");
   EXPECT_GT(expected.size(), 35U);
   EXPECT_EQ(loops_between("merged.db"), expected);
 }

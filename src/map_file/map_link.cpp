@@ -131,30 +131,57 @@ class Relived {
         rejected_(read_rejected_loops(database, map_->damage()), session),
         detector_(options, map_) {}
 
-  /// The next place, and whether it has a loop that the map does not have.
-  std::optional<MapLoop> process(const MapPlace& place) {
+  /// Takes the next place, and adds to `found` the loops that the map does not have, also late
+  /// ones. Those that are withdrawn are taken out again.
+  void process(const MapPlace& place, std::vector<MapLoop>& found) {
     skip_to(place.at.frame);
     auto features = reader_.read(place.id, place.at, map_->damage());
     refuse_damaged(path_, map_->damage().clauses());
     map_->announce(&place);
-    Detection detection = detector_.process(place.content, std::move(*features), place.timestamp_s);
+    const Detection detection =
+        detector_.process(place.content, std::move(*features), place.timestamp_s);
     refuse_damaged(path_, map_->damage().clauses());
-    if (detection.status != Status::loop) return std::nullopt;
-    MapLoop loop = loop_of(detection, session_);
-    loop.query.frame = place.at.frame;
-    if (rejected_.contain(loop)) {
-      detector_.reject(detection);
-      return std::nullopt;
+    frames_.push_back(place.at.frame);
+    if (detection.status == Status::loop) {
+      add(loop_of(detection, session_), found);
     }
-    if (!detection.earlier_match || known_.contain(loop)) return std::nullopt;
-    return loop;
+    for (const LateLoop& loop : detection.withdrawn_loops) {
+      const MapLoop withdrawn = in_session(loop_of(loop, session_));
+      std::erase_if(found, [&](const MapLoop& other) {
+        return other.query == withdrawn.query && other.match == withdrawn.match;
+      });
+    }
+    for (const LateLoop& loop : detection.late_loops) {
+      add(loop_of(loop, session_), found);
+    }
   }
 
  private:
+  /// `counted`: with frames as the detector counts them.
+  void add(const MapLoop& counted, std::vector<MapLoop>& found) {
+    const MapLoop loop = in_session(counted);
+    const bool is_earlier = counted.match.session != session_;
+    if (rejected_.contain(loop)) {
+      detector_.reject({0, counted.query.frame},
+                       {is_earlier ? counted.match.session : 0, counted.match.frame});
+    } else if (is_earlier && !known_.contain(loop)) {
+      found.push_back(loop);
+    }
+  }
+
+  /// With the number that the frame has in its session.
+  [[nodiscard]] MapLoop in_session(MapLoop loop) const {
+    loop.query.frame = frames_[static_cast<std::size_t>(loop.query.frame)];
+    return loop;
+  }
+
   /// Frames without a place were unreadable, or their places were dropped.
   void skip_to(std::int64_t frame) {
     map_->announce(nullptr);
-    for (auto i = std::max(next_frame_, frame - kMaxSkipped); i < frame; ++i) detector_.skip();
+    for (auto i = std::max(next_frame_, frame - kMaxSkipped); i < frame; ++i) {
+      detector_.skip();
+      frames_.push_back(-1);
+    }
     next_frame_ = frame + 1;
   }
 
@@ -165,11 +192,12 @@ class Relived {
   FramePairs known_;
   FramePairs rejected_;
   LoopDetector detector_;
+  std::vector<int> frames_;  ///< in the session, by the number that the detector gives them
   std::int64_t next_frame_ = 0;
 };
 
-/// The loops of a session that the map does not have. `progress(is_new_loop)` is called for each
-/// place; if it returns false, there is no answer.
+/// The loops of a session that the map does not have. `progress(loops)` is called for each place
+/// with how many there are so far; if it returns false, there is no answer.
 template <typename Progress>
 std::optional<std::vector<MapLoop>> new_loops_of(const MapSession& session, const std::string& path,
                                                  const LoopDetectorOptions& options,
@@ -181,9 +209,8 @@ std::optional<std::vector<MapLoop>> new_loops_of(const MapSession& session, cons
   refuse_damaged(path, damage.clauses());
   std::vector<MapLoop> found;
   for (const MapPlace& place : places) {
-    const std::optional<MapLoop> loop = relived.process(place);
-    if (loop) found.push_back(*loop);
-    if (!progress(loop.has_value())) return std::nullopt;
+    relived.process(place, found);
+    if (!progress(found.size())) return std::nullopt;
   }
   return found;
 }
@@ -234,9 +261,9 @@ LinkCounts link(const std::string& path, const Database& database,
   counts.total_places = num_places(database, sessions);
   for (const MapSession& session : sessions) {
     const LinkCounts before = counts;
-    const auto advance = [&](bool is_new) {
+    const auto advance = [&](std::size_t loops) {
       ++counts.places;
-      counts.loops += is_new;
+      counts.loops = before.loops + static_cast<std::int64_t>(loops);
       return !progress || progress(counts);
     };
     const auto loops =
