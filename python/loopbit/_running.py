@@ -62,8 +62,8 @@ def detections_array(detections: Iterable[Detection]) -> numpy.typing.NDArray[An
     """Converts detections to a structured array with the columns of loops.csv.
 
     A match with an earlier session of a map has two columns, earlier_session and earlier_frame.
-    Missing values are nan in timestamp_s and the terms of the score, -1 in match and earlier_frame, 0 in earlier_session, and
-    empty in name and match_name.
+    Missing values are nan in timestamp_s and the terms of the score, -1 in match and
+    earlier_frame, 0 in earlier_session, and empty in name and match_name.
     """
     detections = list(detections)
     names = {d.frame: d.name for d in detections}
