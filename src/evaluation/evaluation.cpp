@@ -213,8 +213,9 @@ double PairCounts::precision() const { return share(right, right + wrong, 1.0); 
 Evaluation evaluate(const MatchList& list, const GroundTruth& truth,
                     const EvaluationOptions& options) {
   Evaluation evaluation = Scorer(list, truth, options).score();
-  const MatchList late = with_changes(list);
-  evaluation.late = Scorer(late, truth, options).score().decision;
+  evaluation.late = list.changes.empty()
+                        ? evaluation.decision
+                        : Scorer(with_changes(list), truth, options).score().decision;
   return evaluation;
 }
 
