@@ -92,14 +92,6 @@ std::vector<RayPair> thinned(std::span<const RayPair> pairs, std::size_t count) 
   return result;
 }
 
-double truncated_cost(const cv::Matx33d& essential, std::span<const RayPair> pairs, double gate) {
-  double cost = 0;
-  for (const RayPair& pair : pairs) {
-    cost += std::min(epipolar_error_sq(pair, essential), gate * gate);
-  }
-  return cost;
-}
-
 /// Pairs that `pose` explains and whose point is before both cameras.
 int points_before(const RigidPose& pose, const cv::Matx33d& essential,
                   std::span<const RayPair> pairs, double gate) {
@@ -216,6 +208,14 @@ cv::Matx33d rotation_between(std::span<const RayPair> pairs) {
   cv::SVD::compute(sum, values, u, v_t);
   const cv::Matx33d mirror(1, 0, 0, 0, 1, 0, 0, 0, cv::determinant(u * v_t));
   return u * mirror * v_t;
+}
+
+double truncated_cost(const cv::Matx33d& essential, std::span<const RayPair> pairs, double gate) {
+  double cost = 0;
+  for (const RayPair& pair : pairs) {
+    cost += std::min(epipolar_error_sq(pair, essential), gate * gate);
+  }
+  return cost;
 }
 
 std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, double gate) {

@@ -14,6 +14,10 @@ namespace loopbit {
 /// The rotation that best turns the query's rays into those of the match (Kabsch 1976).
 cv::Matx33d rotation_between(std::span<const RayPair> pairs);
 
+/// The sum of the pairs' squared epipolar errors, each at most `gate` squared, in standard
+/// deviations.
+double truncated_cost(const cv::Matx33d& essential, std::span<const RayPair> pairs, double gate);
+
 struct DirectionSearch {
   PoseFit best;
   std::optional<PoseFit> rival;  ///< the next best that is no neighbour of it

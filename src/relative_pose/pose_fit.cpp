@@ -7,12 +7,16 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <utility>
+
+#include <opencv2/calib3d.hpp>
 
 namespace loopbit {
 namespace {
 
 constexpr double kHuber = 1.5;  // standard deviations
 constexpr int kMaxSteps = 8;
+constexpr int kSplits = 8;
 
 using Jacobian = cv::Matx<double, 2, 6>;
 
@@ -28,24 +32,33 @@ cv::Matx33d cross_matrix(const cv::Vec3d& v) {
   return {0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0};
 }
 
-/// match . (translation x rotation query) = 0, divided by its standard deviation. The derivative of
-/// that deviation is left out.
+/// match . (translation x rotation query) = 0, divided by its standard deviation. Near the epipole
+/// that deviation depends strongly on the pose, so its derivative counts, too.
 Residual epipolar_residual(const RayPair& pair, const RigidPose& pose) {
-  const cv::Vec3d& m = pair.match.direction;
-  const cv::Vec3d& q = pair.query.direction;
+  // All in the frame of the query's camera.
   const cv::Matx33d back = pose.rotation.t();
-  const cv::Vec3d u = pose.rotation * q;
-  const cv::Vec3d normal = pose.translation.cross(u);              // E q
-  const cv::Vec3d back_normal = back * m.cross(pose.translation);  // E^T m
-  const cv::Vec2d by_match = pair.match.spread.t() * normal;
-  const cv::Vec2d by_query = pair.query.spread.t() * back_normal;
+  const cv::Vec3d& q = pair.query.direction;
+  const cv::Vec3d m = back * pair.match.direction;
+  const cv::Vec3d t = back * pose.translation;
+  const cv::Vec3d normal_of_query = t.cross(q);
+  const cv::Vec3d normal_of_match = m.cross(t);
+  // The noise of each keypoint across the other's epipolar line.
+  const cv::Matx32d match_spread = back * pair.match.spread;
+  const cv::Vec2d by_match = match_spread.t() * normal_of_query;
+  const cv::Vec2d by_query = pair.query.spread.t() * normal_of_match;
   const double sigma = std::sqrt(by_match.dot(by_match) + by_query.dot(by_query));
   if (!(sigma > 0)) return {};
-  const cv::Vec3d by_translation = back * u.cross(m) / sigma;
-  const cv::Vec3d by_rotation = q.cross(back_normal) / sigma;
+  const double value = m.dot(normal_of_query) / sigma;
+  const cv::Vec3d match_pull = match_spread * by_match * (1 / sigma);
+  const cv::Vec3d query_pull = pair.query.spread * by_query * (1 / sigma);
+  const cv::Vec3d sigma_by_translation = q.cross(match_pull) + query_pull.cross(m);
+  const cv::Vec3d sigma_by_rotation =
+      q.cross(match_pull.cross(t)) + query_pull.cross(normal_of_match);
+  const cv::Vec3d by_translation = (q.cross(m) - value * sigma_by_translation) / sigma;
+  const cv::Vec3d by_rotation = (q.cross(normal_of_match) - value * sigma_by_rotation) / sigma;
   Residual residual;
   residual.size = 1;
-  residual.value = {m.dot(normal) / sigma, 0};
+  residual.value = {value, 0};
   for (int i = 0; i < 3; ++i) {
     residual.jacobian(0, i) = by_translation[i];
     residual.jacobian(0, i + 3) = by_rotation[i];
@@ -53,43 +66,60 @@ Residual epipolar_residual(const RayPair& pair, const RigidPose& pose) {
   return residual;
 }
 
-/// Where the query sees the point at the pair's depth (at infinity, for rotation alone), across its
-/// ray, divided by the standard deviations.
-Residual point_residual(const RayPair& pair, const RigidPose& pose) {
-  const cv::Matx33d back = pose.rotation.t();
-  const cv::Vec3d& m = pair.match.direction;
-  const cv::Vec3d seen = back * (m - pair.inverse_depth * pose.translation);
-  const double length = cv::norm(seen);
-  if (!(length > 0)) return {};
-  const cv::Vec3d direction = seen / length;
-  const cv::Vec3d& q = pair.query.direction;
-  if (direction.dot(q) <= 0) {  // behind the camera: far from any inlier
-    Residual behind;
-    behind.size = 2;
-    behind.value = {1e3, 1e3};
-    return behind;
-  }
-  const cv::Matx23d plane = across(q);
-  const cv::Matx23d by_seen =
-      plane * (cv::Matx33d::eye() - direction * direction.t()) * (1 / length);
-  const cv::Matx22d by_query = plane * pair.query.spread;
-  const cv::Vec2d by_inverse_depth = by_seen * (back * pose.translation);
-  const cv::Matx22d by_match =
-      by_seen * back * pair.match.spread - by_inverse_depth * pair.inverse_depth_by_match.t();
-  const cv::Vec2d by_depth = by_inverse_depth * pair.inverse_depth_sigma;
-  const cv::Matx22d covariance =
-      by_query * by_query.t() + by_match * by_match.t() + by_depth * by_depth.t();
-  // The inverse of its Cholesky factor.
+/// d direction / d `point`, on the `plane` across the ray that it is compared with.
+cv::Matx23d direction_by_point(const cv::Matx23d& plane, const cv::Vec3d& point) {
+  const double length = cv::norm(point);
+  const cv::Vec3d direction = point / length;
+  return (plane - (plane * direction) * direction.t()) * (1 / length);
+}
+
+/// The inverse of the Cholesky factor of a covariance.
+cv::Matx22d whitening(const cv::Matx22d& covariance) {
   const double l00 = std::sqrt(covariance(0, 0));
   const double l10 = covariance(1, 0) / l00;
   const double l11 = std::sqrt(std::max(covariance(1, 1) - l10 * l10, 1e-30));
-  const cv::Matx22d whiten(1 / l00, 0, -l10 / (l00 * l11), 1 / l11);
-  const cv::Matx23d whole = whiten * by_seen;
-  const cv::Matx23d by_rotation = whole * cross_matrix(seen);  // of R^T: -[r] seen = seen x r
-  const cv::Matx23d by_translation = whole * (-pair.inverse_depth);
+  return {1 / l00, 0, -l10 / (l00 * l11), 1 / l11};
+}
+
+/// Where the query sees the point at the pair's depth (at infinity, for rotation alone), across its
+/// ray, divided by the standard deviations. These depend on the pose, too. So the derivative is
+/// taken at the likeliest point, between the one that was measured and the query's ray (the
+/// envelope theorem).
+Residual point_residual(const RayPair& pair, const RigidPose& pose) {
+  const cv::Matx33d back = pose.rotation.t();
+  const cv::Vec3d t = back * pose.translation;
+  const cv::Vec3d m = back * pair.match.direction;
+  const cv::Vec3d& q = pair.query.direction;
   Residual residual;
+  const cv::Vec3d seen = m - pair.inverse_depth * t;
+  const double length = cv::norm(seen);
+  if (!(length > 0)) return residual;
   residual.size = 2;
-  residual.value = whiten * (plane * direction);
+  if (seen.dot(q) <= 0) {  // behind the camera: far from any inlier
+    residual.value = {1e3, 1e3};
+    return residual;
+  }
+  const cv::Matx23d plane = across(q);
+  const cv::Matx23d by_seen = direction_by_point(plane, seen);
+  const cv::Matx22d by_query = plane * pair.query.spread;
+  const cv::Vec2d by_inverse_depth = by_seen * t * -1.0;
+  const cv::Matx32d match_spread = back * pair.match.spread;
+  const cv::Matx22d by_match =
+      by_seen * match_spread + by_inverse_depth * pair.inverse_depth_by_match.t();
+  const cv::Vec2d by_depth = by_inverse_depth * pair.inverse_depth_sigma;
+  const cv::Matx22d whiten =
+      whitening(by_query * by_query.t() + by_match * by_match.t() + by_depth * by_depth.t());
+  const cv::Vec2d error = plane * (seen / length);
+  residual.value = whiten * error;
+  // The likeliest noise of the depth and of the match's keypoint.
+  const cv::Vec2d pull = whiten.t() * residual.value;
+  const cv::Vec2d of_match = by_match.t() * pull * -1.0;
+  const double inverse_depth = pair.inverse_depth - pair.inverse_depth_sigma * by_depth.dot(pull) +
+                               pair.inverse_depth_by_match.dot(of_match);
+  const cv::Vec3d likely = m + match_spread * of_match - inverse_depth * t;
+  const cv::Matx23d by_point = whiten * direction_by_point(plane, likely);
+  const cv::Matx23d by_rotation = by_point * cross_matrix(likely);
+  const cv::Matx23d by_translation = by_point * -inverse_depth;
   for (int row = 0; row < 2; ++row) {
     for (int i = 0; i < 3; ++i) {
       residual.jacobian(row, i) = by_translation(row, i);
@@ -163,39 +193,6 @@ cv::Matx66d inverse_within(const cv::Matx66d& squares, const cv::Matx66d& projec
   return projection * inverse * projection;
 }
 
-/// Keypoints of one object err together: its outline turns, its shadow moves. So what counts as
-/// independent is not a pair but a cluster of them, by where the query sees them (Liang and Zeger
-/// 1986: cluster-robust "sandwich" covariance).
-cv::Matx66d covariance_of(std::span<const RayPair> pairs, const std::vector<char>& is_used,
-                          const RigidPose& pose, FitKind kind) {
-  constexpr double kCell = 0.15;  // of a direction
-  std::map<std::array<int, 3>, cv::Vec6d> clusters;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (is_used[i] == 0) continue;
-    const Residual residual = residual_of(pairs[i], pose, kind);
-    const double error = std::sqrt(residual.norm_sq());
-    const double weight = error <= kHuber ? 1.0 : kHuber / error;
-    const cv::Vec3d cell = pairs[i].query.direction / kCell;
-    cv::Vec6d& sum = clusters[{cvFloor(cell[0]), cvFloor(cell[1]), cvFloor(cell[2])}];
-    for (int row = 0; row < residual.size; ++row) {
-      for (int a = 0; a < 6; ++a) {
-        sum[a] += weight * residual.value[row] * residual.jacobian(row, a);
-      }
-    }
-  }
-  cv::Matx66d spread = cv::Matx66d::zeros();
-  for (const auto& [cell, sum] : clusters) spread += sum * sum.t();
-  const Equations at = equations_of(pairs, is_used, pose, kind);
-  const cv::Matx66d inverse = inverse_within(at.squares, fitted_directions(pose, kind));
-  const double unknown = kind == FitKind::rotation ? 3 : kind == FitKind::direction ? 5 : 6;
-  const auto count = static_cast<double>(clusters.size());
-  const double correction = count / std::max(count - unknown, 1.0);
-  // Without depths, errors of whole objects bend the direction further than their clusters show.
-  constexpr double kDirectionVariance = 3;  // by the built-in world, see docs/poses.md
-  const double inflation = kind == FitKind::direction ? kDirectionVariance : 1.0;
-  return (inverse * spread * inverse * correction + inverse) * inflation;
-}
-
 /// Steps until the cost no longer falls.
 void descend(std::span<const RayPair> pairs, const std::vector<char>& is_used, FitKind kind,
              RigidPose& pose) {
@@ -218,6 +215,47 @@ void descend(std::span<const RayPair> pairs, const std::vector<char>& is_used, F
     damping = std::max(damping / 10, 1e-7);
     if (gain < 1e-4 * at.cost) return;
   }
+}
+
+/// Keypoints of one object err together: its outline turns, its shadow moves. So they are drawn
+/// together.
+std::vector<std::vector<RayPair>> clusters_of(std::span<const RayPair> pairs) {
+  constexpr double kCell = 0.05;  // of a direction: about as wide as a descriptor
+  std::map<std::array<int, 3>, std::vector<RayPair>> clusters;
+  for (const RayPair& pair : pairs) {
+    const cv::Vec3d cell = pair.query.direction / kCell;
+    clusters[{cvFloor(cell[0]), cvFloor(cell[1]), cvFloor(cell[2])}].push_back(pair);
+  }
+  std::vector<std::vector<RayPair>> result;
+  for (auto& [cell, members] : clusters) result.push_back(std::move(members));
+  return result;
+}
+
+void shuffle(std::vector<std::vector<RayPair>>& clusters, cv::RNG& chance) {
+  for (std::size_t left = clusters.size(); left > 1; --left) {
+    std::swap(clusters[left - 1],
+              clusters[static_cast<std::size_t>(chance.uniform(0, static_cast<int>(left)))]);
+  }
+}
+
+RigidPose refitted(std::span<const std::vector<RayPair>> clusters, const RigidPose& start,
+                   FitKind kind) {
+  std::vector<RayPair> pairs;
+  for (const auto& cluster : clusters) pairs.insert(pairs.end(), cluster.begin(), cluster.end());
+  const std::vector<char> all(pairs.size(), 1);
+  RigidPose pose = start;
+  descend(pairs, all, kind, pose);
+  return pose;
+}
+
+/// The motion (x, y, z, rx, ry, rz) in the frame of the query's camera that leads from `pose` to
+/// `other`.
+cv::Vec6d motion_between(const RigidPose& pose, const RigidPose& other) {
+  const cv::Matx33d back = pose.rotation.t();
+  cv::Vec3d turn;
+  cv::Rodrigues(back * other.rotation, turn);
+  const cv::Vec3d shift = back * (other.translation - pose.translation);
+  return {shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]};
 }
 
 }  // namespace
@@ -253,7 +291,7 @@ cv::Matx33d essential_matrix(const RigidPose& pose) {
 
 PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind kind, double gate,
                  int rounds) {
-  PoseFit fit{.pose = start, .covariance = cv::Matx66d::zeros()};
+  PoseFit fit{.pose = start};
   if (kind == FitKind::rotation) fit.pose.translation = {};
   std::vector<char> is_used(pairs.size());
   const auto gate_pairs = [&] {
@@ -269,8 +307,25 @@ PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind
     descend(pairs, is_used, kind, fit.pose);
   }
   gate_pairs();
-  fit.covariance = covariance_of(pairs, is_used, fit.pose, kind);
   return fit;
+}
+
+cv::Matx66d covariance_of(std::span<const RayPair> inliers, const RigidPose& pose, FitKind kind) {
+  const cv::Matx66d fitted = fitted_directions(pose, kind);
+  const std::vector<char> all(inliers.size(), 1);
+  const cv::Matx66d usual = inverse_within(equations_of(inliers, all, pose, kind).squares, fitted);
+  std::vector<std::vector<RayPair>> clusters = clusters_of(inliers);
+  const std::size_t half = clusters.size() / 2;
+  cv::RNG chance(1);
+  cv::Matx66d spread = cv::Matx66d::zeros();
+  for (int split = 0; split < kSplits; ++split) {
+    shuffle(clusters, chance);
+    for (const auto part : {std::span(clusters).first(half), std::span(clusters).subspan(half)}) {
+      const cv::Vec6d motion = motion_between(pose, refitted(part, pose, kind));
+      spread += motion * motion.t() * (0.5 / kSplits);
+    }
+  }
+  return fitted * spread * fitted + usual;
 }
 
 }  // namespace loopbit

@@ -24,11 +24,9 @@ enum class FitKind {
   metric,
 };
 
-/// A pose with what the fit knows of it.
 struct PoseFit {
   RigidPose pose;
-  cv::Matx66d covariance;  ///< see RelativePose::covariance
-  double cost = 0;         ///< the sum of truncated squared residuals, in standard deviations
+  double cost = 0;  ///< the sum of truncated squared residuals, in standard deviations
 };
 
 /// The rotation by the vector `r`, Rodrigues' formula.
@@ -58,5 +56,13 @@ inline constexpr int kFitRounds = 3;
 /// standard deviations do not count; which these are is decided anew in each of `rounds`.
 PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind kind, double gate,
                  int rounds);
+
+/// How far the pose may be off, in the terms of RelativePose::covariance: the spread of poses that
+/// are fitted to random halves of the inliers, beginning from `pose` (half-sampling: Efron, "The
+/// Jackknife, the Bootstrap and Other Resampling Plans", 1982, chapter 8), plus the usual
+/// covariance of least squares. Half of the pairs has twice the variance of all, so the spread of a
+/// half around the whole is the variance of the whole. Refitting follows the curved valleys of the
+/// cost, which its curvature at one point does not show. The halves are the same in each call.
+cv::Matx66d covariance_of(std::span<const RayPair> inliers, const RigidPose& pose, FitKind kind);
 
 }  // namespace loopbit

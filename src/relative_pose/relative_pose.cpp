@@ -24,6 +24,8 @@ namespace {
 /// Of keypoints; see keypoint_sigma_px().
 constexpr double kUsualSigma_px = 0.5;
 constexpr int kMinPoints = 8;
+/// A pose with a cost below this multiple of the best one explains the pairs about as well.
+constexpr double kMaxWorse = 1.2;
 
 double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -160,7 +162,7 @@ class RelativePoseEstimator::Impl {
                      RelativePose& result) {
     const double scale = residual_scale(inliers, fit.pose, kind);
     result.T_match_query = matrix_of(fit.pose);
-    result.covariance = fit.covariance;
+    result.covariance = covariance_of(inliers, fit.pose, kind);
     result.rms_px = scale * kUsualSigma_px;
     result.inliers.clear();
     for (const RayPair& pair : inliers) result.inliers.push_back(pair.features);
@@ -175,6 +177,7 @@ class RelativePoseEstimator::Impl {
     inliers_ = inliers_of(pairs_, fit.pose, FitKind::direction, gate());
     if (static_cast<int>(inliers_.size()) < options_.min_inliers) return;
     starts_ = {fit.pose};
+    direction_cost_ = fit.cost;
     if (found->rival) starts_.push_back(found->rival->pose);
     report(fit, FitKind::direction, inliers_, result);
     result.status = PoseStatus::measured;
@@ -194,7 +197,6 @@ class RelativePoseEstimator::Impl {
       result.known = PoseKnown::rotation;
       return;
     }
-    constexpr double kMaxWorse = 1.2;
     const auto other = rival_of_plane(inliers_, found.best, gate());
     const PoseFit best = fit_pose(inliers_, found.best.pose, FitKind::direction, gate(), 0);
     if (other && other->cost < kMaxWorse * best.cost) {
@@ -244,6 +246,11 @@ class RelativePoseEstimator::Impl {
     const auto inliers = inliers_of(pairs_, fit->pose, FitKind::metric, gate());
     const auto points = std::ranges::count_if(inliers, &RayPair::has_depth);
     if (points < kMinPoints || static_cast<int>(inliers.size()) < options_.min_inliers) return;
+    if (contradicts_directions(fit->pose, result.status)) {
+      result.status = PoseStatus::ambiguous;
+      result.known = PoseKnown::nothing;
+      return;
+    }
     RelativePose metric = result;
     report(*fit, FitKind::metric, inliers, metric);
     if (largest_sigma(metric.covariance, 0) > options_.max_position_share * distance_m(inliers)) {
@@ -254,6 +261,16 @@ class RelativePoseEstimator::Impl {
     result.status = PoseStatus::measured;
     result.known = PoseKnown::metric;
     result.scale = ScaleStatus::known;
+  }
+
+  /// Whether a pose with a length explains the rays much worse than the best direction does: then
+  /// the fit of the points stopped in a wrong minimum, or their depths are wrong. Without parallax
+  /// there is no direction to compare with.
+  [[nodiscard]] bool contradicts_directions(const RigidPose& pose, PoseStatus directions) const {
+    if (directions == PoseStatus::pure_rotation || directions == PoseStatus::little_parallax) {
+      return false;
+    }
+    return truncated_cost(essential_matrix(pose), pairs_, gate()) > kMaxWorse * direction_cost_;
   }
 
   static double distance_m(std::span<const RayPair> inliers) {
@@ -301,7 +318,8 @@ class RelativePoseEstimator::Impl {
   Verifier verifier_;
   Verification found_;
   std::vector<RayPair> pairs_;
-  std::vector<RayPair> inliers_;   ///< of the direction
+  std::vector<RayPair> inliers_;  ///< of the direction
+  double direction_cost_ = 0;
   std::vector<RigidPose> starts_;  ///< what the directions say, best first
 };
 
