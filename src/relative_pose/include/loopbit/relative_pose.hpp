@@ -136,7 +136,7 @@ struct RelativePose {
 /// epipolar_inliers()) is followed by nonlinear least squares with a robust loss, from many
 /// starting points, each residual weighted by the noise of its two keypoints. With depths, each
 /// inlier with a depth adds a second equation, and the translation gets a length; SQPnP is a second
-/// starting point. The same input gives the same pose. Cost: 1 ms after the matches, see
+/// starting point. The same input gives the same pose. Cost: 2 to 5 ms after the matches, see
 /// scripts/bench_poses.
 class RelativePoseEstimator {
  public:
