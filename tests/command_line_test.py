@@ -80,7 +80,7 @@ class CommandLineTest(CommandTest):
         self.assertEqual(sorted((row["query"], row["match"]) for row in poses),
                          sorted((row["frame"], row["match"]) for row in loops))
         for row in poses:
-            self.assertEqual(len(row), 14 + 21)
+            self.assertEqual(len(row), 16 + 21)
             is_known = row["known"] != "nothing"
             for name in ("x", "qw", "rms_px", "cov_x_x", "cov_rz_rz"):
                 self.assertEqual(row[name] != "", is_known, row)

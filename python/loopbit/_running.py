@@ -127,6 +127,8 @@ def run_folder(
     ignore: Path | None = None,
     positions_m: numpy.typing.ArrayLike | Path | None = None,
     camera: Path | None = None,
+    depth: Path | None = None,
+    depth_scale: float = 5000.0,
     keep_images: bool = False,
     map_cache_mb: int | None = None,
     overwrite: bool = False,
@@ -150,6 +152,9 @@ def run_folder(
     file of poses also provides them.
     camera: a calibration file, see read_cameras(), whose first camera is that of the images. The run
     then measures the relative pose of each loop and writes relative_poses.csv.
+    depth: a folder of depth images, so that relative poses are in metres: with names like those of
+    the images, or a TUM RGB-D folder with its depth.txt. 16-bit depth has depth_scale units per
+    metre.
     Files count all frames of the sequence, whatever part of it is read.
 
     Arguments are checked before the first frame as far as possible. If truth or positions turn out
@@ -176,6 +181,8 @@ def run_folder(
         poses=file,
         positions_m=rows,
         camera=camera or "",
+        depth=depth or "",
+        depth_scale=depth_scale,
     ), on_bad_frame)
 
 

@@ -118,7 +118,22 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
               "relative pose of each loop for relative_poses.csv. Default: the one in a "
               "KITTI or EuRoC folder, or camera.yaml in the folder")
           ->type_name("FILE");
-  command->add_flag("--no-poses", flags->no_poses, "Measure no relative poses")->excludes(camera);
+  CLI::Option* depth =
+      command
+          ->add_option("--depth", flags->session.run.depth,
+                       "Depth images, so that relative poses are in metres: a folder with names "
+                       "like those of the images, or a TUM RGB-D folder with its depth.txt")
+          ->type_name("DIR");
+  command
+      ->add_option("--depth-scale", flags->session.run.depth_scale,
+                   "Units per metre of 16-bit depth images; most sensors: 1000")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(number(1e-3, 1e6))
+      ->needs(depth);
+  command->add_flag("--no-poses", flags->no_poses, "Measure no relative poses")
+      ->excludes(camera)
+      ->excludes(depth);
   command->footer(list_truth_settings());
   command->callback(
       [flags, &arguments, &exit_code] { exit_code = run_command(*flags, arguments); });

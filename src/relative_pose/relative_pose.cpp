@@ -137,6 +137,8 @@ class RelativePoseEstimator::Impl {
 
   RelativePose estimate(const PoseRequest& request) {
     RelativePose result;
+    const bool is_length_asked = request.match_depth_m != nullptr || !request.beside.empty();
+    if (is_length_asked) result.scale = ScaleStatus::few_points;  // until there is a geometry
     // Matches, as pairs of rays.
     if (request.matches.empty()) {
       verifier_.match(*request.query.features, *request.match.features, found_);
@@ -150,8 +152,7 @@ class RelativePoseEstimator::Impl {
     estimate_direction(result);
     if (result.status == PoseStatus::no_geometry) return result;
     // With depths, the length.
-    if (request.match_depth_m != nullptr || !request.beside.empty())
-      estimate_metric(request, result);
+    if (is_length_asked) estimate_metric(request, result);
     return result;
   }
 

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <filesystem>
 #include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -28,7 +29,8 @@ void for_each_covariance(const Visit& visit) {
 }
 
 std::string header() {
-  std::string text = "query,match,status,known,x,y,z,qx,qy,qz,qw,matches,inliers,rms_px";
+  std::string text =
+      "query,match,status,known,scale,x,y,z,qx,qy,qz,qw,matches,inliers,points,rms_px";
   for_each_covariance([&](int row, int column) {
     text += fmt::format(",cov_{}_{}", kAxes[static_cast<std::size_t>(row)],
                         kAxes[static_cast<std::size_t>(column)]);
@@ -41,9 +43,10 @@ std::string csv_row(PlaceId query, const std::string& match, const RelativePose&
   const bool is_known = pose.known != PoseKnown::nothing;
   std::string transform = is_known ? to_tum_pose(pose) : std::string(6, ' ');
   std::ranges::replace(transform, ' ', ',');
-  std::string row = fmt::format("{},{},{},{},{},{},{},{}", query, match, to_string(pose.status),
-                                to_string(pose.known), transform, pose.matches, pose.inliers.size(),
-                                is_known ? fmt::format("{:.4f}", pose.rms_px) : "");
+  std::string row = fmt::format("{},{},{},{},{},{},{},{},{},{}", query, match,
+                                to_string(pose.status), to_string(pose.known),
+                                to_string(pose.scale), transform, pose.matches, pose.inliers.size(),
+                                pose.points, is_known ? fmt::format("{:.4f}", pose.rms_px) : "");
   for_each_covariance(
       [&](int i, int j) { row += is_known ? fmt::format(",{:.9g}", pose.covariance(i, j)) : ","; });
   return row + '\n';
@@ -51,14 +54,18 @@ std::string csv_row(PlaceId query, const std::string& match, const RelativePose&
 
 }  // namespace
 
-PoseFile::PoseFile(const std::string& folder, const CameraModel& camera)
-    : path_((std::filesystem::path(folder) / kPosesFile).string()), camera_(camera) {
+PoseFile::PoseFile(const std::string& folder, const CameraModel& camera,
+                   std::optional<DepthFolder> depth)
+    : path_((std::filesystem::path(folder) / kPosesFile).string()),
+      camera_(camera),
+      depth_(std::move(depth)) {
   errno = 0;
   stream_.open(path_, std::ios::binary);
   append(header());
 }
 
 void PoseFile::add(const Detection& detection, const LoopDetector& detector) {
+  if (depth_) shots_.push_back({detection.name, detection.timestamp_s});
   for (const LateLoop& loop : detection.late_loops) add_loop(loop, detector);
   if (detection.status != Status::loop) return;
   add_loop({.frame = detection.frame,
@@ -72,8 +79,18 @@ void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
   const Features match =
       detector.features_of(loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}));
   if (query.working_size_px != match.working_size_px) return;
+  const cv::Mat1f depth_m = depth_of(loop);
   append(csv_row(loop.frame, match_cell(loop),
-                 estimator_.estimate({.query = {&query, &camera_}, .match = {&match, &camera_}})));
+                 estimator_.estimate({.query = {&query, &camera_},
+                                      .match = {&match, &camera_},
+                                      .match_depth_m = depth_ ? &depth_m : nullptr})));
+}
+
+/// Empty for a match of an earlier session: a map stores no depth.
+cv::Mat1f PoseFile::depth_of(const LateLoop& loop) const {
+  if (!depth_ || !loop.match) return {};
+  const Shot& shot = shots_.at(static_cast<std::size_t>(*loop.match));
+  return depth_->depth_m(shot.name, shot.time_s, camera_.size_px);
 }
 
 void PoseFile::append(const std::string& row) {

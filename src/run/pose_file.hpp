@@ -3,12 +3,16 @@
 #pragma once
 
 #include <fstream>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "loopbit/camera.hpp"
 #include "loopbit/detection.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/relative_pose.hpp"
+
+#include "depth_folder.hpp"
 
 namespace loopbit {
 
@@ -16,7 +20,8 @@ namespace loopbit {
 class PoseFile {
  public:
   /// `camera`: of all images, with their size. Throws Error (kind output).
-  PoseFile(const std::string& folder, const CameraModel& camera);
+  /// `depth`: of the images, if there is any.
+  PoseFile(const std::string& folder, const CameraModel& camera, std::optional<DepthFolder> depth);
 
   /// Measures the poses of its loops, also late ones, and hands the rows to the system. `detector`
   /// has the features of both frames. Loops between images of different shapes are left out: they
@@ -25,10 +30,19 @@ class PoseFile {
 
  private:
   void add_loop(const LateLoop& loop, const LoopDetector& detector);
+  [[nodiscard]] cv::Mat1f depth_of(const LateLoop& loop) const;
   void append(const std::string& row);
 
   std::string path_;
+  /// What a depth image is found by.
+  struct Shot {
+    std::string name;
+    std::optional<double> time_s;
+  };
+
   CameraModel camera_;
+  std::optional<DepthFolder> depth_;
+  std::vector<Shot> shots_;  ///< one per frame; empty without depth
   RelativePoseEstimator estimator_;
   std::ofstream stream_;
 };

@@ -14,6 +14,7 @@
 #include "loopbit/finished_run.hpp"
 #include "loopbit/picture_jpeg.hpp"
 
+#include "depth_folder.hpp"
 #include "evidence_writer.hpp"
 #include "pose_file.hpp"
 #include "run_files.hpp"
@@ -111,6 +112,21 @@ std::optional<CameraModel> camera_of(RunInput& input, const RunRequest& request)
   return camera;
 }
 
+/// Throws Error if there is no camera to go with the depth images, or they do not fit it.
+std::optional<DepthFolder> depth_of(const RunRequest& request,
+                                    const std::optional<CameraModel>& camera) {
+  if (request.depth.empty()) return std::nullopt;
+  if (!camera) {
+    throw Error(ErrorKind::option,
+                fmt::format("The depth images of '{}' need the calibration of the camera; give "
+                            "camera, or leave depth out.",
+                            request.depth));
+  }
+  DepthFolder depth(request.depth, request.depth_scale);
+  depth.check(camera->size_px);
+  return depth;
+}
+
 /// Null without a map.
 std::shared_ptr<MapWriter> open_map(const RunInput& input, const RunRequest& request) {
   if (request.map.empty()) return nullptr;
@@ -152,10 +168,11 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
 class RecordedRun {
  public:
   RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected,
-              const std::optional<CameraModel>& camera)
+              const std::optional<CameraModel>& camera, std::optional<DepthFolder> depth)
       : input_(input),
         request_(request),
         camera_(camera),
+        depth_(std::move(depth)),
         frames_(std::move(expected)),
         map_(open_map(input, request)),
         detector_(std::in_place, request.options, map_),
@@ -171,7 +188,7 @@ class RecordedRun {
     const std::shared_ptr<MapWriter> map = std::move(map_);
     LoopDetector detector = std::move(*detector_);
     std::optional<PoseFile> poses;
-    if (camera_) poses.emplace(folder_.path(), *camera_);
+    if (camera_) poses.emplace(folder_.path(), *camera_, std::move(depth_));
     RunListener recording{.on_detection =
                               [&](const Detection& detection) {
                                 folder_.add(detection);
@@ -253,8 +270,9 @@ class RecordedRun {
   RunInput& input_;
   const RunRequest& request_;
   std::optional<CameraModel> camera_;
-  FramesRead frames_;               ///< expected, then read
-  std::shared_ptr<MapWriter> map_;  ///< null without one, and after detect()
+  std::optional<DepthFolder> depth_;  ///< until detect()
+  FramesRead frames_;                 ///< expected, then read
+  std::shared_ptr<MapWriter> map_;    ///< null without one, and after detect()
   std::optional<LoopDetector> detector_;
   RunRecord record_;
   RunFolder folder_;
@@ -271,7 +289,8 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
   if (request.overwrite || request.options.exclusion.seconds > 0) {
     check_time(input.prove(), request.options);
   }
-  RecordedRun run(input, request, expected, camera_of(input, request));
+  const std::optional<CameraModel> camera = camera_of(input, request);
+  RecordedRun run(input, request, expected, camera, depth_of(request, camera));
   try {
     run.detect(listener, stop);
   } catch (const std::exception& error) {

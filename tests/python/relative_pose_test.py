@@ -54,9 +54,11 @@ def test_depth_gives_metres(camera, images):
     far = np.full((240, 320), np.nan, np.float32)
     pose = loopbit.relative_pose(ahead, features, camera, match_depth_m=far)
     assert pose.known != loopbit.PoseKnown.metric and pose.points == 0
-    plane = np.full((240, 320), 10.0)
+    plane = np.full((240, 320), 10.0)  # which contradicts the directions
     pose = loopbit.relative_pose(ahead, features, camera, match_depth_m=plane)
-    assert pose.points > 0
+    assert pose.status == loopbit.PoseStatus.ambiguous and pose.points == 0
+    pose = loopbit.relative_pose(features, features, camera, match_depth_m=plane)
+    assert pose.known == loopbit.PoseKnown.metric and pose.points > 0
     edge = pose.to_g2o_edge(4, 9).split()
     assert edge[:3] == ["EDGE_SE3:QUAT", "4", "9"] and len(edge) == 3 + 7 + 21
 
@@ -91,3 +93,18 @@ def test_a_run_folder_has_relative_poses(command, dataset, tmp_path):
     assert files[0].read_bytes() == files[1].read_bytes()
     assert files[0].read_text().count("\n") == 1 + sum(
         d.is_loop + len(d.late_loops) for d in run.detections)
+
+
+def test_a_run_folder_takes_depth(command, dataset, tmp_path):
+    ten_m = b"P5 320 240 65535 " + np.full((240, 320), 10_000, ">u2").tobytes()
+    for image in sorted((dataset / "images").iterdir()):
+        (tmp_path / image.with_suffix(".pgm").name).write_bytes(ten_m)
+    camera = dataset / "camera.yaml"
+    command("run", dataset / "images", "--out", tmp_path / "cpp", "--camera", camera, "--depth",
+            tmp_path, "--depth-scale", 1000)
+    loopbit.run_folder(dataset / "images", tmp_path / "python", camera=camera, depth=tmp_path,
+                       depth_scale=1000)
+    files = [tmp_path / side / "relative_poses.csv" for side in ("python", "cpp")]
+    assert files[0].read_bytes() == files[1].read_bytes()
+    scales = {row.split(",")[4] for row in files[0].read_text().splitlines()[1:]}
+    assert scales and not scales & {"not_asked", "no_depth"}

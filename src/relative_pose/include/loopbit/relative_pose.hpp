@@ -156,10 +156,12 @@ class RelativePoseEstimator {
   std::unique_ptr<Impl> impl_;
 };
 
+inline constexpr double kTumDepthUnitsPerM = 5000;
+
 /// Metres for each pixel of a depth image as data sets store it: 16-bit integers in units of
 /// 1 / `units_per_m` (5000 for TUM RGB-D, 1000 for most sensors), or floats in metres. 0 stays 0.
 /// Throws Error (kind input) for another type.
-cv::Mat1f depth_in_metres(const cv::Mat& depth, double units_per_m = 5000);
+cv::Mat1f depth_in_metres(const cv::Mat& depth, double units_per_m = kTumDepthUnitsPerM);
 
 /// The inverse covariance, as g2o's EDGE_SE3:QUAT expects it: of (x, y, z, qx, qy, qz), in which a
 /// quaternion's vector is half a rotation vector. What is not known has no information: if only the

@@ -14,6 +14,7 @@
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/map_file.hpp"
 #include "loopbit/poses.hpp"
+#include "loopbit/relative_pose.hpp"
 #include "loopbit/run_input.hpp"
 #include "loopbit/run_record.hpp"
 #include "loopbit/runner.hpp"
@@ -43,7 +44,11 @@ struct RunRequest {
   std::optional<Positions> positions_m = std::nullopt;  ///< one per frame, in place of `poses`
   /// The camera of the images, to measure the relative pose of each loop.
   std::optional<CameraModel> camera = std::nullopt;
-  std::string camera_file = {};                ///< where it is from, for messages and run.json
+  std::string camera_file = {};  ///< where it is from, for messages and run.json
+  /// A folder of depth images, so that translations get a length: of TUM RGB-D, with a depth.txt,
+  /// or of images named like those of the run. Needs `camera`. Empty = none.
+  std::string depth = {};
+  double depth_scale = kTumDepthUnitsPerM;     ///< 16-bit depth: units per metre
   std::vector<std::string> other_inputs = {};  ///< more files that are never replaced
 };
 
@@ -68,9 +73,9 @@ struct RunOutcome {
 /// says why, the map has the places so far, and the exception goes on.
 ///
 /// Throws Error: kind option for a request that contradicts itself or the input, or without a
-/// folder and a map; kind input for files of truth and poses, for a camera that does not fit the
-/// images, and if the input has ended without a readable frame; kind output if something cannot be
-/// saved; and what MapWriter and run() throw.
+/// folder and a map; kind input for files of truth and poses, for a camera or depth that does not
+/// fit the images, and if the input has ended without a readable frame; kind output if something
+/// cannot be saved; and what MapWriter and run() throw.
 RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
                       const std::atomic<bool>& stop);
 

@@ -1,0 +1,154 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "depth_folder.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "loopbit/camera_file.hpp"
+#include "loopbit/record_run.hpp"
+#include "loopbit/text_rows.hpp"
+#include "loopbit/world.hpp"
+
+#include "test_support.hpp"
+
+namespace loopbit {
+namespace {
+
+const cv::Size kSize_px(16, 12);
+
+class DepthFolderTest : public test::ScratchTest {
+ protected:
+  /// Of 1, 2, ... metres, at 1000 units per metre.
+  void write_depth(const std::string& name, int metres, cv::Size size_px = kSize_px) const {
+    const std::filesystem::path file = path(name);
+    std::filesystem::create_directories(file.parent_path());
+    ASSERT_TRUE(cv::imwrite(file.string(), cv::Mat1w(size_px, static_cast<ushort>(1000 * metres))));
+  }
+
+  /// What is wrong with the folder, checked for images of kSize_px.
+  [[nodiscard]] std::string fault() const {
+    try {
+      DepthFolder(path("depth"), 1000).check(kSize_px);
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::input);
+      return error.what();
+    }
+    return "";
+  }
+};
+
+double metres(const cv::Mat1f& depth_m) {
+  return depth_m.empty() ? 0 : static_cast<double>(depth_m(0, 0));
+}
+
+TEST_F(DepthFolderTest, FindsTheImageOfTheSameName) {
+  write_depth("depth/000001.png", 1);
+  write_depth("depth/000007.tiff", 7);
+  const DepthFolder depth(path("depth"), 1000);
+  EXPECT_NO_THROW(depth.check(kSize_px));
+  EXPECT_NO_THROW(depth.check({640, 480}));  // of the same shape
+  EXPECT_NEAR(metres(depth.depth_m("images/000001.jpg", {}, kSize_px)), 1, 1e-5);
+  EXPECT_NEAR(metres(depth.depth_m("000007.png", 3.5, kSize_px)), 7, 1e-5);
+  EXPECT_TRUE(depth.depth_m("000002.png", {}, kSize_px).empty());
+}
+
+TEST_F(DepthFolderTest, FindsTheNearestTimeOfTumRgbd) {
+  write_depth("tum/depth/a.png", 1);
+  write_depth("tum/depth/b.png", 2);
+  write("tum/depth.txt", "# depth maps\n10.000 depth/a.png\n10.030 depth/b.png\n20 depth/no.png\n");
+  const DepthFolder depth(path("tum"), 500);
+  EXPECT_NEAR(metres(depth.depth_m("rgb/x.png", 10.012, kSize_px)), 2, 1e-5);  // 1000 units at 500 per m
+  EXPECT_NEAR(metres(depth.depth_m("rgb/x.png", 10.017, kSize_px)), 4, 1e-5);
+  EXPECT_TRUE(depth.depth_m("rgb/x.png", 10.06, kSize_px).empty());
+  EXPECT_TRUE(depth.depth_m("rgb/x.png", {}, kSize_px).empty());
+  EXPECT_TRUE(depth.depth_m("rgb/x.png", 20.0, kSize_px).empty());  // the file is missing
+}
+
+TEST_F(DepthFolderTest, NamesWhatIsWrong) {
+  EXPECT_NE(fault().find("depth' cannot be read"), std::string::npos) << fault();
+  std::filesystem::create_directory(path("depth"));
+  EXPECT_NE(fault().find("depth' has no depth images"), std::string::npos) << fault();
+  write_depth("depth/0.png", 1, {16, 10});
+  EXPECT_NE(fault().find("0.png' has 16 x 10 px, but the images have 16 x 12"), std::string::npos)
+      << fault();
+  cv::imwrite(path("depth/0.png"), cv::Mat1b(kSize_px, 1));
+  EXPECT_NE(fault().find("0.png': A depth image has"), std::string::npos) << fault();
+  write("depth/0.png", "");
+  EXPECT_NE(fault().find("0.png' is empty"), std::string::npos) << fault();
+  write("depth/depth.txt", "now depth/0.png\n");
+  EXPECT_NE(fault().find("depth.txt"), std::string::npos) << fault();
+}
+
+/// Errors of the lengths of relative_poses.csv, as shares of the true ones.
+std::vector<double> length_errors(const std::string& file, const World& world) {
+  std::vector<double> errors;
+  std::vector<std::string_view> cells;
+  for (const TextRow& row : read_rows(file)) {
+    split_cells(row.text, cells);
+    if (cells[3] != "metric") continue;
+    const auto number = [&](std::size_t at) { return parse_number<double>(cells[at]).value(); };
+    const cv::Vec3d found(number(5), number(6), number(7));
+    const cv::Matx44d truth = world.T_world_camera(static_cast<int>(number(1))).inv() *
+                              world.T_world_camera(static_cast<int>(number(0)));
+    const double length_m = cv::norm(cv::Vec3d(truth(0, 3), truth(1, 3), truth(2, 3)));
+    if (length_m > 0.5) errors.push_back(std::abs(cv::norm(found) - length_m) / length_m);
+  }
+  return errors;
+}
+
+TEST_F(DepthFolderTest, ARunWithDepthMeasuresMetres) {
+  WorldOptions options;
+  options.frames = 150;
+  options.laps = 2;
+  options.spacing_m = 1.5;
+  options.width_px = 320;
+  options.height_px = 240;
+  const World world(options);
+  write_dataset(world, path("town"));
+  std::filesystem::create_directory(path("depth"));
+  constexpr double kUnitsPerM = 200;
+  for (int frame = 0; frame < options.frames; ++frame) {
+    if (frame % 10 == 3) continue;  // some are missing
+    cv::Mat stored;
+    world.depth_m(frame).convertTo(stored, CV_16U, kUnitsPerM);
+    cv::imwrite(path(fmt::format("depth/{:06}.png", frame)), stored);
+  }
+  const RunRequest request{.folder = path("run"),
+                           .evidence = false,
+                           .camera = read_camera(path("town/camera.yaml")),
+                           .camera_file = "camera.yaml",
+                           .depth = path("depth"),
+                           .depth_scale = kUnitsPerM};
+  RunInput input(open_source(path("town/images")), path("town/images"));
+  record_run(input, request, {[](const Detection&) {}, [](const std::string&) {}}, false);
+  std::vector<double> errors = length_errors(path("run/relative_poses.csv"), world);
+  ASSERT_GT(errors.size(), 20U);
+  const auto middle = errors.begin() + std::ssize(errors) / 2;
+  std::nth_element(errors.begin(), middle, errors.end());
+  EXPECT_LT(*middle, 0.05);
+}
+
+TEST_F(DepthFolderTest, DepthNeedsACamera) {
+  write_depth("images/0.png", 1);
+  const RunRequest request{.folder = path("run"), .depth = path("images")};
+  RunInput input(open_source(path("images")), path("images"));
+  try {
+    record_run(input, request, {[](const Detection&) {}, [](const std::string&) {}}, false);
+    FAIL() << "depth without a camera was accepted";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.kind(), ErrorKind::option);
+    EXPECT_NE(std::string(error.what()).find("need the calibration"), std::string::npos);
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("run")));
+}
+
+}  // namespace
+}  // namespace loopbit
