@@ -227,6 +227,7 @@ std::vector<std::vector<RayPair>> clusters_of(std::span<const RayPair> pairs) {
     clusters[{cvFloor(cell[0]), cvFloor(cell[1]), cvFloor(cell[2])}].push_back(pair);
   }
   std::vector<std::vector<RayPair>> result;
+  result.reserve(clusters.size());
   for (auto& [cell, members] : clusters) result.push_back(std::move(members));
   return result;
 }
