@@ -110,6 +110,7 @@ class CommandLineTest(CommandTest):
         self.assertGreater(len(poses), 0)
         for row in poses:
             self.assertRegex(row["match"], r"^1:\d+$")
+        self.assertEqual((self.scratch / "2" / "relative_poses.g2o").read_text(), "")
 
     def test_a_camera_that_does_not_fit_is_refused(self):
         camera = self.camera_for(width_px=640)
@@ -136,7 +137,8 @@ class CommandLineTest(CommandTest):
         self.assertIn(f"with {images / 'camera.yaml'}", ran.stdout)
         ran = loopbit(*run, "--no-poses")
         self.assertEqual((ran.returncode, complaints(ran)), (0, []))
-        self.assertFalse((self.out / "relative_poses.csv").exists())
+        for name in ("relative_poses.csv", "relative_poses.g2o", "matched_poses.tum"):
+            self.assertFalse((self.out / name).exists(), name)
 
     def test_a_found_calibration_that_does_not_fit_is_told_and_left_out(self):
         images = self.few_images(3)

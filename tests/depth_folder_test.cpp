@@ -4,9 +4,14 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <set>
+#include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -65,7 +70,8 @@ TEST_F(DepthFolderTest, FindsTheNearestTimeOfTumRgbd) {
   write_depth("tum/depth/b.png", 2);
   write("tum/depth.txt", "# depth maps\n10.000 depth/a.png\n10.030 depth/b.png\n20 depth/no.png\n");
   const DepthFolder depth(path("tum"), 500);
-  EXPECT_NEAR(metres(depth.depth_m("rgb/x.png", 10.012, kSize_px)), 2, 1e-5);  // 1000 units at 500 per m
+  EXPECT_NEAR(metres(depth.depth_m("rgb/x.png", 10.012, kSize_px)), 2,
+              1e-5);  // 1000 units at 500 per m
   EXPECT_NEAR(metres(depth.depth_m("rgb/x.png", 10.017, kSize_px)), 4, 1e-5);
   EXPECT_TRUE(depth.depth_m("rgb/x.png", 10.06, kSize_px).empty());
   EXPECT_TRUE(depth.depth_m("rgb/x.png", {}, kSize_px).empty());
@@ -104,6 +110,133 @@ std::vector<double> length_errors(const std::string& file, const World& world) {
   return errors;
 }
 
+/// Numbers between spaces.
+std::vector<double> numbers(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<double> values;
+  for (double value = 0; stream >> value;) values.push_back(value);
+  return values;
+}
+
+/// A symmetric matrix from the 21 numbers of its upper triangle, the last of `values`.
+cv::Matx66d symmetric(const std::vector<double>& values) {
+  cv::Matx66d matrix;
+  std::size_t at = values.size() - 21;
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column)
+      matrix(row, column) = matrix(column, row) = values.at(at++);
+  }
+  return matrix;
+}
+
+/// What relative_poses.csv knows of the poses, in the order of its rows.
+struct KnownRow {
+  bool is_metric;
+  std::vector<double> ids;   ///< match, query
+  std::vector<double> pose;  ///< position and quaternion
+  cv::Matx66d covariance;
+};
+
+std::vector<KnownRow> known_rows(const std::string& folder) {
+  std::vector<KnownRow> known;
+  for (const TextRow& row : read_rows(folder + "/relative_poses.csv")) {
+    std::vector<std::string_view> cells;
+    split_cells(row.text, cells);
+    if (cells[0] == "query" || cells[3] == "nothing") continue;
+    std::vector<double> values;
+    for (std::size_t at = 5; at < cells.size(); ++at)
+      values.push_back(parse_number<double>(cells[at]).value());
+    known.push_back(
+        {.is_metric = cells[3] == "metric",
+         .ids = {parse_number<double>(cells[1]).value(), parse_number<double>(cells[0]).value()},
+         .pose = {values.begin(), values.begin() + 7},
+         .covariance = symmetric(values)});
+  }
+  return known;
+}
+
+/// The edge of a row: the same pose, and the inverse covariance, of half a rotation vector.
+void expect_edge(const std::vector<double>& edge, const KnownRow& row) {
+  ASSERT_EQ(edge.size(), 2U + 7 + 21);
+  EXPECT_EQ(std::vector<double>(edge.begin(), edge.begin() + 2), row.ids);
+  EXPECT_EQ(std::vector<double>(edge.begin() + 2, edge.begin() + 9), row.pose);
+  const cv::Matx66d information = symmetric(edge);
+  if (!row.is_metric) {
+    EXPECT_EQ(cv::norm(information.get_minor<3, 6>(0, 0)), 0);
+    return;
+  }
+  const cv::Matx66d covariance = information.inv(cv::DECOMP_SVD);
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      const double unit = (i >= 3 ? 2 : 1) * (j >= 3 ? 2 : 1);
+      const double size = std::sqrt(row.covariance(i, i) * row.covariance(j, j));
+      EXPECT_NEAR(unit * covariance(i, j), row.covariance(i, j), 1e-4 * size);
+    }
+  }
+}
+
+/// relative_poses.g2o has the edges of the table, each after its vertices.
+void expect_graph(const std::string& folder) {
+  const std::vector<KnownRow> known = known_rows(folder);
+  std::set<double> vertices;
+  std::size_t edges = 0;
+  for (const TextRow& row : read_rows(folder + "/relative_poses.g2o")) {
+    const std::string text(row.text);
+    const std::size_t space = text.find(' ');
+    const std::vector<double> values = numbers(text.substr(space));
+    if (text.substr(0, space) == "VERTEX_SE3:QUAT") {
+      EXPECT_EQ(std::vector<double>(values.begin() + 1, values.end()),
+                (std::vector<double>{0, 0, 0, 0, 0, 0, 1}));
+      EXPECT_TRUE(vertices.insert(values[0]).second) << text;
+      continue;
+    }
+    ASSERT_EQ(text.substr(0, space), "EDGE_SE3:QUAT");
+    ASSERT_LT(edges, known.size());
+    EXPECT_TRUE(vertices.contains(values[0]) && vertices.contains(values[1])) << text;
+    expect_edge(values, known[edges++]);
+  }
+  EXPECT_EQ(edges, known.size());
+}
+
+double time_s(double frame) { return 1000 + frame / 2; }
+
+/// The images of a source, at the times of time_s().
+class TimedImages final : public ImageSource {
+ public:
+  explicit TimedImages(std::unique_ptr<ImageSource> images) : images_(std::move(images)) {}
+
+  bool next(Frame& frame) override {
+    const bool is_there = images_->next(frame);
+    frame.timestamp_s = time_s(position_++);
+    return is_there;
+  }
+  bool skip() override {
+    ++position_;
+    return images_->skip();
+  }
+  [[nodiscard]] std::optional<std::size_t> size() const override { return images_->size(); }
+  [[nodiscard]] std::string description() const override { return images_->description(); }
+
+ private:
+  std::unique_ptr<ImageSource> images_;
+  int position_ = 0;
+};
+
+/// matched_poses.tum has the metric poses of the table, at the times of the queries.
+void expect_matched(const std::string& folder) {
+  std::vector<std::vector<double>> expected;
+  for (const KnownRow& row : known_rows(folder)) {
+    if (!row.is_metric) continue;
+    expected.push_back({time_s(row.ids[1])});
+    expected.back().insert(expected.back().end(), row.pose.begin(), row.pose.end());
+  }
+  std::vector<std::vector<double>> found;
+  for (const TextRow& row : read_rows(folder + "/matched_poses.tum")) {
+    if (!row.text.starts_with('#')) found.push_back(numbers(std::string(row.text)));
+  }
+  EXPECT_EQ(found, expected);
+}
+
 TEST_F(DepthFolderTest, ARunWithDepthMeasuresMetres) {
   WorldOptions options;
   options.frames = 150;
@@ -127,13 +260,16 @@ TEST_F(DepthFolderTest, ARunWithDepthMeasuresMetres) {
                            .camera_file = "camera.yaml",
                            .depth = path("depth"),
                            .depth_scale = kUnitsPerM};
-  RunInput input(open_source(path("town/images")), path("town/images"));
+  RunInput input(std::make_unique<TimedImages>(open_source(path("town/images"))),
+                 path("town/images"));
   record_run(input, request, {[](const Detection&) {}, [](const std::string&) {}}, false);
   std::vector<double> errors = length_errors(path("run/relative_poses.csv"), world);
   ASSERT_GT(errors.size(), 20U);
   const auto middle = errors.begin() + std::ssize(errors) / 2;
   std::nth_element(errors.begin(), middle, errors.end());
   EXPECT_LT(*middle, 0.05);
+  expect_graph(path("run"));
+  expect_matched(path("run"));
 }
 
 TEST_F(DepthFolderTest, DepthNeedsACamera) {

@@ -151,7 +151,8 @@ def run_folder(
     positions_m: camera centres, one per frame read, nan if unknown; or a file of poses. A truth
     file of poses also provides them.
     camera: a calibration file, see read_cameras(), whose first camera is that of the images. The run
-    then measures the relative pose of each loop and writes relative_poses.csv.
+    then measures the relative pose of each loop and writes relative_poses.csv, relative_poses.g2o
+    and matched_poses.tum.
     depth: a folder of depth images, so that relative poses are in metres: with names like those of
     the images, or a TUM RGB-D folder with its depth.txt. 16-bit depth has depth_scale units per
     metre.

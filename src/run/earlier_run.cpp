@@ -24,7 +24,8 @@ namespace fs = std::filesystem;
 /// Last those that tell a run from a data set, so that a run half removed is still one.
 std::vector<std::string> files_of_a_run() {
   std::vector<std::string> names{kTruthFile,     kNotFalseFile, kIgnoreFile,    kUnknownFile,
-                                 kPositionsFile, kPosesFile,    kLateLoopsFile, kReportFile};
+                                 kPositionsFile, kPosesFile,    kPoseGraphFile, kMatchedPosesFile,
+                                 kLateLoopsFile, kReportFile};
   for (const char* suffix : kDatabaseSuffixes) {
     names.push_back(std::string(kEvidenceFile) + suffix);
   }

@@ -56,16 +56,17 @@ std::string csv_row(PlaceId query, const std::string& match, const RelativePose&
 
 PoseFile::PoseFile(const std::string& folder, const CameraModel& camera,
                    std::optional<DepthFolder> depth)
-    : path_((std::filesystem::path(folder) / kPosesFile).string()),
-      camera_(camera),
-      depth_(std::move(depth)) {
-  errno = 0;
-  stream_.open(path_, std::ios::binary);
-  append(header());
+    : camera_(camera),
+      depth_(std::move(depth)),
+      table_(folder, kPosesFile),
+      graph_(folder, kPoseGraphFile),
+      matched_(folder, kMatchedPosesFile) {
+  table_.append(header());
+  matched_.append("# timestamp x y z qx qy qz qw\n");
 }
 
 void PoseFile::add(const Detection& detection, const LoopDetector& detector) {
-  if (depth_) shots_.push_back({detection.name, detection.timestamp_s});
+  shots_.push_back({detection.name, detection.timestamp_s});
   for (const LateLoop& loop : detection.late_loops) add_loop(loop, detector);
   if (detection.status != Status::loop) return;
   add_loop({.frame = detection.frame,
@@ -80,10 +81,27 @@ void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
       detector.features_of(loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}));
   if (query.working_size_px != match.working_size_px) return;
   const cv::Mat1f depth_m = depth_of(loop);
-  append(csv_row(loop.frame, match_cell(loop),
-                 estimator_.estimate({.query = {&query, &camera_},
-                                      .match = {&match, &camera_},
-                                      .match_depth_m = depth_ ? &depth_m : nullptr})));
+  const RelativePose pose = estimator_.estimate({.query = {&query, &camera_},
+                                                 .match = {&match, &camera_},
+                                                 .match_depth_m = depth_ ? &depth_m : nullptr});
+  table_.append(csv_row(loop.frame, match_cell(loop), pose));
+  add_edge(loop, pose);
+  if (pose.known != PoseKnown::metric) return;
+  const Shot& shot = shots_.at(static_cast<std::size_t>(loop.frame));
+  matched_.append(fmt::format("{:.6f} {}\n", shot.time_s.value_or(static_cast<double>(loop.frame)),
+                              to_tum_pose(pose)));
+}
+
+/// An edge to another session is left out: its frames have numbers of their own. A vertex comes
+/// before its first edge, because g2o skips an edge whose vertices it has not read.
+void PoseFile::add_edge(const LateLoop& loop, const RelativePose& pose) {
+  if (!loop.match || pose.known == PoseKnown::nothing) return;
+  std::string lines;
+  for (const PlaceId frame : {*loop.match, loop.frame}) {
+    if (!vertices_.insert(frame).second) continue;
+    lines += fmt::format("VERTEX_SE3:QUAT {} {}\n", frame, to_tum_pose({}));
+  }
+  graph_.append(lines + to_g2o_edge(pose, *loop.match, loop.frame) + '\n');
 }
 
 /// Empty for a match of an earlier session: a map stores no depth.
@@ -93,8 +111,15 @@ cv::Mat1f PoseFile::depth_of(const LateLoop& loop) const {
   return depth_->depth_m(shot.name, shot.time_s, camera_.size_px);
 }
 
-void PoseFile::append(const std::string& row) {
-  stream_ << row << std::flush;
+PoseFile::Lines::Lines(const std::string& folder, const char* name)
+    : path_((std::filesystem::path(folder) / name).string()) {
+  errno = 0;
+  stream_.open(path_, std::ios::binary);
+  if (!stream_) throw cannot_write(path_, errno);
+}
+
+void PoseFile::Lines::append(const std::string& text) {
+  stream_ << text << std::flush;
   if (!stream_) throw cannot_write(path_, errno);
 }
 

@@ -4,6 +4,7 @@
 
 #include <fstream>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,14 +17,15 @@
 
 namespace loopbit {
 
-/// Writes relative_poses.csv, one row per loop; see docs/run_folder.md.
+/// Writes relative_poses.csv, one row per loop, and what is known of it as relative_poses.g2o and
+/// matched_poses.tum; see docs/run_folder.md.
 class PoseFile {
  public:
   /// `camera`: of all images, with their size. Throws Error (kind output).
   /// `depth`: of the images, if there is any.
   PoseFile(const std::string& folder, const CameraModel& camera, std::optional<DepthFolder> depth);
 
-  /// Measures the poses of its loops, also late ones, and hands the rows to the system. `detector`
+  /// Measures the poses of its loops, also late ones, and hands the lines to the system. `detector`
   /// has the features of both frames. Loops between images of different shapes are left out: they
   /// cannot be from one camera. Throws Error (kind output), and what features_of() throws.
   void add(const Detection& detection, const LoopDetector& detector);
@@ -31,9 +33,18 @@ class PoseFile {
  private:
   void add_loop(const LateLoop& loop, const LoopDetector& detector);
   [[nodiscard]] cv::Mat1f depth_of(const LateLoop& loop) const;
-  void append(const std::string& row);
+  void add_edge(const LateLoop& loop, const RelativePose& pose);
 
-  std::string path_;
+  class Lines {
+   public:
+    Lines(const std::string& folder, const char* name);
+    void append(const std::string& text);
+
+   private:
+    std::string path_;
+    std::ofstream stream_;
+  };
+
   /// What a depth image is found by.
   struct Shot {
     std::string name;
@@ -42,9 +53,12 @@ class PoseFile {
 
   CameraModel camera_;
   std::optional<DepthFolder> depth_;
-  std::vector<Shot> shots_;  ///< one per frame; empty without depth
+  std::vector<Shot> shots_;  ///< one per frame
   RelativePoseEstimator estimator_;
-  std::ofstream stream_;
+  Lines table_;
+  Lines graph_;
+  Lines matched_;
+  std::set<PlaceId> vertices_;  ///< frames in graph_
 };
 
 }  // namespace loopbit

@@ -23,6 +23,8 @@ inline constexpr const char* kIgnoreFile = "ignore.csv";
 inline constexpr const char* kUnknownFile = "unknown.csv";
 inline constexpr const char* kPositionsFile = "positions.csv";
 inline constexpr const char* kPosesFile = "relative_poses.csv";
+inline constexpr const char* kPoseGraphFile = "relative_poses.g2o";
+inline constexpr const char* kMatchedPosesFile = "matched_poses.tum";
 inline constexpr const char* kReportFile = "report.html";
 
 /// The folder in a run folder for the run that is being replaced.
