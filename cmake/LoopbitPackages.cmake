@@ -10,7 +10,7 @@ set(root ${PROJECT_SOURCE_DIR})
 set(CPACK_SOURCE_IGNORE_FILES "^${root}/build/" "^${root}/loopbit_demo/" "^${root}/[.]git(/|$)" /node_modules/
                               /dist/ /__pycache__/ [.]egg-info/ "^${root}/python/loopbit/.*[.]so$")
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL lib map images poses data dev tools python)
+set(CPACK_COMPONENTS_ALL lib map images poses graph data dev tools python)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
@@ -47,6 +47,12 @@ set(CPACK_DEBIAN_POSES_PACKAGE_DEPENDS "libloopbit${abi} ${this}")
 set(CPACK_DEBIAN_POSES_DESCRIPTION "${summary}: relative poses
  Reads camera calibrations and measures the relative pose of two images.")
 
+set(CPACK_DEBIAN_GRAPH_PACKAGE_NAME libloopbit-graph${abi})
+set(CPACK_DEBIAN_GRAPH_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_GRAPH_PACKAGE_DEPENDS "libloopbit${abi} ${this}, libloopbit-poses${abi} ${this}")
+set(CPACK_DEBIAN_GRAPH_DESCRIPTION "${summary}: pose graphs
+ Tells right loops from wrong ones by odometry and corrects the trajectory.")
+
 set(CPACK_DEBIAN_DATA_PACKAGE_NAME libloopbit-data${abi})
 set(CPACK_DEBIAN_DATA_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS
@@ -57,7 +63,7 @@ set(CPACK_DEBIAN_DATA_DESCRIPTION "${summary}: data sets, scores, reports
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libloopbit-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-data${abi} ${this}, libopencv-dev")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, libopencv-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "${summary}: headers
  For programs that use loopbit, with CMake or pkg-config.")
 

@@ -26,6 +26,12 @@ grep -q '^edge [0-9]* -> [0-9]*, score' "$scratch/edges"
 (($(grep -c '^EDGE_SE3:QUAT [0-9]* [0-9]* ' "$scratch/measured_edges") >= 10))
 [[ $(awk '{ print NF }' "$scratch/measured_edges" | sort -u) == 31 ]]
 
+# Of two loops the wrong one is found out, and the drift is taken back.
+(cd "$scratch" && build/correct_trajectory) | tee "$scratch/corrected"
+grep -qx 'loop 45 -> 5: kept' "$scratch/corrected"
+grep -qxE 'loop 65 -> 5: (unreachable|inconsistent|outlier)' "$scratch/corrected"
+[[ $(grep -c '^EDGE_SE3:QUAT' "$scratch/corrected.g2o") == 81 ]]
+
 # An image that is too small and one that is none change no other frame's number.
 cp -r "$scratch/town/images" "$scratch/odd"
 { printf 'P5\n16 16\n255\n' && head -c 256 <(seq 100); } >"$scratch/odd/000003.png"

@@ -33,6 +33,7 @@ link loopbit_map -lloopbit
 link loopbit_images -lloopbit
 link loopbit_recordings -lloopbit_images -lloopbit_map -lloopbit
 link loopbit_poses -lloopbit -lopencv_calib3d -lyaml-cpp
+link loopbit_graph -lloopbit_poses -lloopbit
 link loopbit_data -lloopbit_poses -lloopbit_images -lloopbit_map -lloopbit
 link loopbit_report -lloopbit_data -lloopbit_poses -lloopbit_images -lloopbit_map -lloopbit
 

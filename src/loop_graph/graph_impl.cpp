@@ -1,0 +1,346 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "graph_impl.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "pose_problem.hpp"
+#include "robust_solve.hpp"
+
+namespace loopbit {
+namespace {
+
+using graph::Edge;
+using graph::Keyframe;
+using graph::Pose;
+
+std::size_t index(int number) { return static_cast<std::size_t>(number); }
+
+/// Sets of numbers that are joined step by step; the smallest number stands for its set.
+class Joined {
+ public:
+  explicit Joined(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0);
+  }
+  int root(int i) {
+    while (parent_[index(i)] != i) {
+      parent_[index(i)] = parent_[index(parent_[index(i)])];
+      i = parent_[index(i)];
+    }
+    return i;
+  }
+  void join(int a, int b) {
+    const auto [low, high] = std::minmax({root(a), root(b)});
+    parent_[index(high)] = low;
+  }
+
+ private:
+  std::vector<int> parent_;
+};
+
+}  // namespace
+
+LoopGraph::Impl::Impl(const LoopGraphOptions& options) : options_(options) {
+  validate(options, "graph");
+}
+
+int LoopGraph::Impl::add_keyframe(const std::optional<Edge>& odometry) {
+  const int number = static_cast<int>(keyframes_.size());
+  Keyframe keyframe{.chain = number, .odometry = odometry};
+  Pose pose = graph::kIdentity;
+  if (odometry) {
+    const Keyframe& before = keyframes_.back();
+    keyframe.chain = before.chain;
+    keyframe.reckoned = graph::times(before.reckoned, odometry->measured);
+    const graph::Matrix6d carry = graph::adjoint(keyframe.reckoned);
+    keyframe.drift = before.drift + carry * odometry->information.inverse() * carry.transpose();
+    pose = graph::times(poses_.back(), odometry->measured);
+  }
+  keyframes_.push_back(keyframe);
+  poses_.push_back(pose);
+  return number;
+}
+
+int LoopGraph::Impl::add_loop(const LoopEdge& loop, const Edge& edge) {
+  edges_.push_back(edge);
+  wide_.push_back(graph::wide_loop(edge, options_.seen_within_m));
+  loops_.push_back({.edge = loop, .limit = limit(edge.known)});
+  loops_.back().odometry_chi2 = graph::odometry_chi2(keyframes_, wide_.back());
+  return static_cast<int>(loops_.size()) - 1;
+}
+
+double LoopGraph::Impl::limit(PoseKnown known) const {
+  return graph::chi2_limit(options_.confidence, graph::freedom_of(known));
+}
+
+double LoopGraph::Impl::chi2(std::size_t loop) const {
+  const Edge& edge = edges_[loop];
+  return graph::chi2_of(edge, poses_[index(edge.from)], poses_[index(edge.to)],
+                        options_.seen_within_m);
+}
+
+void LoopGraph::Impl::measure_chi2() {
+  for (std::size_t i = 0; i < loops_.size(); ++i) loops_[i].chi2 = chi2(i);
+}
+
+double LoopGraph::Impl::cost() const {
+  double sum = 0;
+  for (const Keyframe& keyframe : keyframes_) {
+    if (!keyframe.odometry) continue;
+    const Edge& edge = *keyframe.odometry;
+    sum += graph::chi2_of(edge, poses_[index(edge.from)], poses_[index(edge.to)],
+                          options_.seen_within_m);
+  }
+  for (const std::size_t i : of_verdict(LoopVerdict::kept)) sum += chi2(i);
+  return sum / 2;
+}
+
+std::vector<std::size_t> LoopGraph::Impl::of_verdict(LoopVerdict verdict) const {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < loops_.size(); ++i) {
+    if (loops_[i].verdict == verdict) found.push_back(i);
+  }
+  return found;
+}
+
+void LoopGraph::Impl::solve() {
+  // What odometry alone makes impossible.
+  reject_unreachable();
+  // What most loops nearby contradict.
+  reject_inconsistent();
+  // Everything else, with a robust loss.
+  start_from_odometry();
+  solve_kept();
+  // Of loops that only others contradicted, those that fit.
+  keep_what_fits();
+  measure_chi2();
+  judged_ = loops_.size();
+  for (const std::size_t i : of_verdict(LoopVerdict::kept)) {
+    last_kept_query_ = std::max(last_kept_query_, edges_[i].to);
+  }
+}
+
+void LoopGraph::Impl::reject_unreachable() {
+  const double limit = graph::chi2_limit(options_.confidence, 6);
+  for (JudgedLoop& loop : loops_) {
+    const bool is_reachable = loop.odometry_chi2.value_or(0) <= limit;
+    loop.verdict = is_reachable ? LoopVerdict::kept : LoopVerdict::unreachable;
+  }
+}
+
+void LoopGraph::Impl::reject_inconsistent() {
+  const std::vector<std::size_t> reachable = of_verdict(LoopVerdict::kept);
+  std::vector<graph::WideLoop> wide;
+  for (const std::size_t i : reachable) wide.push_back(wide_[i]);
+  const auto agreements =
+      graph::find_consistent(keyframes_, wide, graph::chi2_limit(options_.confidence, 6));
+  for (std::size_t k = 0; k < reachable.size(); ++k) {
+    JudgedLoop& loop = loops_[reachable[k]];
+    loop.compared = agreements[k].compared;
+    loop.agreeing = agreements[k].agreeing;
+    if (!agreements[k].is_consistent) loop.verdict = LoopVerdict::inconsistent;
+  }
+}
+
+void LoopGraph::Impl::start_from_odometry() {
+  for (std::size_t i = 0; i < poses_.size(); ++i) poses_[i] = keyframes_[i].reckoned;
+  // A chain is moved to where the loop says that has most others on its side.
+  std::vector<std::size_t> kept = of_verdict(LoopVerdict::kept);
+  std::ranges::stable_sort(kept, std::greater{}, [&](std::size_t i) { return loops_[i].agreeing; });
+  Joined placed(keyframes_.size());
+  std::map<int, Pose> T_world_chain;
+  const auto chain_of = [&](int keyframe) { return keyframes_[index(keyframe)].chain; };
+  const auto place_of = [&](int chain) {
+    const auto found = T_world_chain.find(chain);
+    return found == T_world_chain.end() ? graph::kIdentity : found->second;
+  };
+  for (const std::size_t i : kept) {
+    const int match = placed.root(chain_of(edges_[i].from));
+    const int query = placed.root(chain_of(edges_[i].to));
+    if (match == query) continue;
+    // All chains joined so far to that of the larger number move together.
+    const auto at = [&](int keyframe) {
+      return graph::times(place_of(chain_of(keyframe)), keyframes_[index(keyframe)].reckoned);
+    };
+    const Pose& loop = wide_[i].T_match_query;
+    const Pose goal = match < query ? graph::times(at(edges_[i].from), loop)
+                                    : graph::times(at(edges_[i].to), graph::inverse(loop));
+    const Pose now = at(match < query ? edges_[i].to : edges_[i].from);
+    const Pose move = graph::times(goal, graph::inverse(now));
+    for (const Keyframe& keyframe : keyframes_) {
+      const bool is_first = !keyframe.odometry;
+      if (!is_first || placed.root(keyframe.chain) != std::max(match, query)) continue;
+      T_world_chain[keyframe.chain] = graph::times(move, place_of(keyframe.chain));
+    }
+    placed.join(match, query);
+  }
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    const auto found = T_world_chain.find(keyframes_[i].chain);
+    if (found != T_world_chain.end()) poses_[i] = graph::times(found->second, poses_[i]);
+  }
+}
+
+std::vector<int> LoopGraph::Impl::roots() const {
+  Joined joined(keyframes_.size());
+  for (const Keyframe& keyframe : keyframes_) {
+    if (keyframe.odometry) joined.join(keyframe.odometry->from, keyframe.odometry->to);
+  }
+  for (const std::size_t i : of_verdict(LoopVerdict::kept)) {
+    joined.join(edges_[i].from, edges_[i].to);
+  }
+  std::vector<int> found;
+  for (int i = 0; i < static_cast<int>(keyframes_.size()); ++i) {
+    if (joined.root(i) == i) found.push_back(i);
+  }
+  return found;
+}
+
+void LoopGraph::Impl::solve_kept() {
+  const std::vector<std::size_t> kept = of_verdict(LoopVerdict::kept);
+  std::vector<Edge> odometry;
+  std::vector<Edge> loops;
+  std::vector<double> limits;
+  for (const Keyframe& keyframe : keyframes_) {
+    if (keyframe.odometry) odometry.push_back(*keyframe.odometry);
+  }
+  for (const std::size_t i : kept) {
+    loops.push_back(edges_[i]);
+    limits.push_back(loops_[i].limit);
+  }
+  const auto solution =
+      graph::solve_robustly(poses_, odometry, loops, limits, roots(), options_.seen_within_m);
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    if (!solution.is_kept[k]) loops_[kept[k]].verdict = LoopVerdict::outlier;
+  }
+}
+
+void LoopGraph::Impl::keep_what_fits() {
+  bool any = false;
+  for (const std::size_t i : of_verdict(LoopVerdict::inconsistent)) {
+    if (chi2(i) > loops_[i].limit) continue;
+    loops_[i].verdict = LoopVerdict::kept;
+    any = true;
+  }
+  if (any) solve_whole();
+}
+
+void LoopGraph::Impl::update() {
+  const bool is_new = judged_ < loops_.size();
+  const bool bends = judge_new_loops();
+  if (is_new) solve_window();
+  // If the latest keyframes cannot follow, all have to.
+  bool is_strained = bends;
+  for (std::size_t i = judged_; i < loops_.size(); ++i) {
+    is_strained =
+        is_strained || (loops_[i].verdict == LoopVerdict::kept && chi2(i) > loops_[i].limit);
+  }
+  if (is_strained && is_new) {
+    // Chains that nothing joined have to be moved first.
+    const bool joins = std::any_of(
+        loops_.begin() + static_cast<std::ptrdiff_t>(judged_), loops_.end(),
+        [](const auto& loop) { return loop.verdict == LoopVerdict::kept && !loop.odometry_chi2; });
+    joins ? solve() : solve_whole();
+  }
+  for (std::size_t i = judged_; i < loops_.size(); ++i) {
+    loops_[i].chi2 = chi2(i);
+    if (loops_[i].verdict == LoopVerdict::kept)
+      last_kept_query_ = static_cast<int>(poses_.size()) - 1;
+  }
+  judged_ = loops_.size();
+}
+
+/// Whether kept loops contradict the estimate.
+bool LoopGraph::Impl::judge_new_loops() {
+  const double limit = graph::chi2_limit(options_.confidence, 6);
+  bool waits = false;
+  for (std::size_t i = judged_; i < loops_.size(); ++i) {
+    JudgedLoop& loop = loops_[i];
+    if (loop.odometry_chi2.value_or(0) > limit) {
+      loop.verdict = LoopVerdict::unreachable;
+    } else if (chi2(i) <= loop.limit) {
+      loop.verdict = LoopVerdict::kept;
+    } else {
+      waits = true;
+    }
+  }
+  return waits && confirm_waiting_loops();
+}
+
+/// Keeps new loops that contradict the estimate if an earlier one that waits agrees with them.
+bool LoopGraph::Impl::confirm_waiting_loops() {
+  constexpr std::size_t kReach = 20;
+  const double limit = graph::chi2_limit(options_.confidence, 6);
+  const std::size_t begin = judged_ < kReach ? 0 : judged_ - kReach;
+  bool any = false;
+  for (std::size_t i = judged_; i < loops_.size(); ++i) {
+    if (loops_[i].verdict != LoopVerdict::undecided) continue;
+    for (std::size_t other = begin; other < i; ++other) {
+      const LoopVerdict verdict = loops_[other].verdict;
+      if (verdict != LoopVerdict::undecided && verdict != LoopVerdict::kept) continue;
+      if (!graph::are_comparable(keyframes_, wide_[i], wide_[other])) continue;
+      ++loops_[i].compared;
+      if (graph::pair_chi2(keyframes_, wide_[other], wide_[i]) > limit) continue;
+      ++loops_[i].agreeing;
+      any = any || verdict == LoopVerdict::undecided;
+      loops_[other].verdict = loops_[i].verdict = LoopVerdict::kept;
+    }
+  }
+  return any;
+}
+
+void LoopGraph::Impl::solve_window() {
+  constexpr int kIterations = 5;
+  const int end = static_cast<int>(poses_.size());
+  const int begin = std::max(0, std::min(end - options_.window, last_kept_query_));
+  graph::PoseProblem problem(poses_, options_.seen_within_m);
+  for (int i = begin + 1; i < end; ++i) {
+    const auto& odometry = keyframes_[index(i)].odometry;
+    if (odometry) problem.add(*odometry);
+  }
+  for (std::size_t i = loops_.size(); i-- > 0;) {
+    const Edge& edge = edges_[i];
+    if (std::max(edge.from, edge.to) <= begin) {
+      // Loops come in the order of their queries.
+      if (i < judged_) break;
+      continue;
+    }
+    if (loops_[i].verdict != LoopVerdict::kept) continue;
+    problem.add(edge);
+    if (std::min(edge.from, edge.to) <= begin) problem.fix(std::min(edge.from, edge.to));
+  }
+  problem.fix(begin);
+  problem.solve(kIterations);
+}
+
+void LoopGraph::Impl::solve_whole() {
+  constexpr int kIterations = 10;
+  const auto solve_once = [&] {
+    graph::PoseProblem problem(poses_, options_.seen_within_m);
+    for (const Keyframe& keyframe : keyframes_) {
+      if (keyframe.odometry) problem.add(*keyframe.odometry);
+    }
+    for (const std::size_t i : of_verdict(LoopVerdict::kept)) problem.add(edges_[i]);
+    for (const int keyframe : roots()) problem.fix(keyframe);
+    problem.solve(kIterations);
+  };
+  solve_once();
+  bool any = false;
+  for (const std::size_t i : of_verdict(LoopVerdict::kept)) {
+    if (chi2(i) <= loops_[i].limit) continue;
+    loops_[i].verdict = LoopVerdict::outlier;
+    any = true;
+  }
+  if (any) solve_once();
+}
+
+void LoopGraph::Impl::set_pose(int keyframe, const Pose& pose) { poses_[index(keyframe)] = pose; }
+
+void LoopGraph::Impl::set_verdict(int loop, LoopVerdict verdict) {
+  loops_[index(loop)].verdict = verdict;
+}
+
+}  // namespace loopbit

@@ -1,0 +1,113 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "loopbit/odometry.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+
+#include <fmt/format.h>
+#include <opencv2/core/hal/hal.hpp>
+
+#include "loopbit/error.hpp"
+#include "loopbit/rigid_motion.hpp"
+
+namespace loopbit {
+namespace {
+
+constexpr double kRadians = std::numbers::pi / 180;
+/// Files are rounded; what is further than this from a rotation is something else.
+constexpr double kMaxRotationError = 1e-3;
+
+bool is_finite(const double* first, int count) {
+  return std::all_of(first, first + count, [](double value) { return std::isfinite(value); });
+}
+
+bool is_rigid(const cv::Matx44d& T) {
+  const cv::Matx33d rotation = T.get_minor<3, 3>(0, 0);
+  const double error = cv::norm(rotation * rotation.t() - cv::Matx33d::eye(), cv::NORM_INF);
+  const bool has_last_row = T(3, 0) == 0 && T(3, 1) == 0 && T(3, 2) == 0 && T(3, 3) == 1;
+  return has_last_row && error <= kMaxRotationError && cv::determinant(rotation) > 0;
+}
+
+bool is_covariance(const cv::Matx66d& covariance) {
+  if (!is_finite(covariance.val, 36)) return false;
+  const double size = cv::norm(covariance, cv::NORM_INF);
+  if (!(cv::norm(covariance - covariance.t(), cv::NORM_INF) <= 1e-9 * size)) return false;
+  cv::Matx66d work = covariance;
+  return cv::hal::Cholesky64f(work.val, 6 * sizeof(double), 6, nullptr, 0, 0);
+}
+
+}  // namespace
+
+cv::Matx66d drift_covariance(const cv::Matx44d& T_from_to, const OdometryDrift& drift) {
+  constexpr double kLeastPosition_m = 1e-4;
+  constexpr double kLeastRotation = 1e-3 * kRadians;
+  const double distance_m = cv::norm(rigid::translation(T_from_to));
+  const double turned = rigid::angle(T_from_to);
+  // Independent steps with this variance add up to the drift over the correlated distance.
+  const double variance_m = distance_m * std::max(distance_m, drift.correlated_m);
+  const double position_m = drift.position_per_m * drift.position_per_m * variance_m;
+  const double per_m = drift.rotation_deg_per_m * kRadians;
+  const double rotation = per_m * per_m * variance_m + drift.rotation_per_rad *
+                                                           drift.rotation_per_rad * turned *
+                                                           std::max(turned, 1.0);
+  const double p = position_m + kLeastPosition_m * kLeastPosition_m;
+  const double r = rotation + kLeastRotation * kLeastRotation;
+  return cv::Matx66d::diag({p, p, p, r, r, r});
+}
+
+void check_odometry(const OdometryPose& pose, const std::string& name) {
+  if (!is_finite(pose.T_odometry_camera.val, 16) || !is_rigid(pose.T_odometry_camera)) {
+    throw Error(ErrorKind::input,
+                fmt::format("{} is not a rigid motion: give a rotation (3 x 3), a finite position "
+                            "in metres, and 0 0 0 1 as the last row.",
+                            name));
+  }
+  if (pose.covariance && !is_covariance(*pose.covariance)) {
+    throw Error(ErrorKind::input, fmt::format("The covariance of {} is not positive definite: give "
+                                              "a symmetric one of (x, y, z, rx, ry, rz), or none.",
+                                              name));
+  }
+}
+
+OdometryTrack::OdometryTrack(const OdometryDrift& drift) : drift_(drift) {
+  validate(drift, "odometry");
+}
+
+void OdometryTrack::add(const std::optional<OdometryPose>& pose) {
+  Frame frame;
+  if (last_) frame.path_m = last_->path_m;
+  if (pose) {
+    check_odometry(*pose, fmt::format("The odometry of frame {}", frames_.size()));
+    frame.is_known = true;
+    frame.pose = pose->T_odometry_camera;
+    if (last_) {
+      const cv::Matx44d step = rigid::inverse(last_->pose) * frame.pose;
+      const cv::Matx66d adjoint = rigid::adjoint(frame.pose);
+      const cv::Matx66d covariance =
+          pose->covariance ? *pose->covariance : drift_covariance(step, drift_);
+      frame.path_m += cv::norm(rigid::translation(step));
+      frame.drift = last_->drift + adjoint * covariance * adjoint.t();
+    }
+    last_ = frame;
+  }
+  frames_.push_back(frame);
+}
+
+std::optional<Motion> OdometryTrack::between(int from, int to) const {
+  const Frame& a = frames_.at(static_cast<std::size_t>(from));
+  const Frame& b = frames_.at(static_cast<std::size_t>(to));
+  if (!a.is_known || !b.is_known) return std::nullopt;
+  const cv::Matx44d back = rigid::inverse(b.pose);
+  const cv::Matx66d adjoint = rigid::adjoint(back);
+  const cv::Matx66d drift = from < to ? b.drift - a.drift : a.drift - b.drift;
+  return Motion{rigid::inverse(a.pose) * b.pose, adjoint * drift * adjoint.t()};
+}
+
+double OdometryTrack::path_m(int frame) const {
+  return frames_.at(static_cast<std::size_t>(frame)).path_m;
+}
+
+}  // namespace loopbit
