@@ -20,7 +20,7 @@ Edge edge_of(const LoopEdge& loop, const LoopGraphOptions& options);
 }  // namespace graph
 
 /// See LoopGraph. Loops have the same number in loops(), edges() and wide_.
-class LoopGraph::Impl {
+class [[gnu::visibility("hidden")]] LoopGraph::Impl {
  public:
   explicit Impl(const LoopGraphOptions& options);
 

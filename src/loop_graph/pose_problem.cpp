@@ -210,7 +210,7 @@ void PoseProblem::fix(int keyframe) {
 double PoseProblem::solve(int max_iterations) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  // It is as fast on these graphs, and sums in the same order with any BLAS.
+  // It sums in the same order with any BLAS.
   options.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
   options.max_num_iterations = max_iterations;
   options.function_tolerance = 1e-7;
