@@ -135,6 +135,7 @@ void LoopGraph::Impl::reject_unreachable() {
 void LoopGraph::Impl::reject_inconsistent() {
   const std::vector<std::size_t> reachable = of_verdict(LoopVerdict::kept);
   std::vector<graph::WideLoop> wide;
+  wide.reserve(reachable.size());
   for (const std::size_t i : reachable) wide.push_back(wide_[i]);
   const auto agreements =
       graph::find_consistent(keyframes_, wide, graph::chi2_limit(options_.confidence, 6));

@@ -24,14 +24,15 @@
 namespace loopbit {
 namespace graph {
 
-Pose pose_of(const cv::Matx44d& T) {
+Pose pose_of(const cv::Matx44d& transform) {
   Eigen::Matrix3d rotation;
   for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) rotation(row, column) = T(row, column);
+    for (int column = 0; column < 3; ++column) rotation(row, column) = transform(row, column);
   }
   const Eigen::Quaterniond q = Eigen::Quaterniond(rotation).normalized();
   const double sign = q.w() < 0 ? -1 : 1;
-  return {T(0, 3), T(1, 3), T(2, 3), sign * q.x(), sign * q.y(), sign * q.z(), sign * q.w()};
+  return {transform(0, 3), transform(1, 3), transform(2, 3), sign * q.x(),
+          sign * q.y(),    sign * q.z(),    sign * q.w()};
 }
 
 namespace {

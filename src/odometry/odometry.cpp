@@ -24,10 +24,11 @@ bool is_finite(const double* first, int count) {
   return std::all_of(first, first + count, [](double value) { return std::isfinite(value); });
 }
 
-bool is_rigid(const cv::Matx44d& T) {
-  const cv::Matx33d rotation = T.get_minor<3, 3>(0, 0);
+bool is_rigid(const cv::Matx44d& transform) {
+  const cv::Matx33d rotation = transform.get_minor<3, 3>(0, 0);
   const double error = cv::norm(rotation * rotation.t() - cv::Matx33d::eye(), cv::NORM_INF);
-  const bool has_last_row = T(3, 0) == 0 && T(3, 1) == 0 && T(3, 2) == 0 && T(3, 3) == 1;
+  const bool has_last_row =
+      transform(3, 0) == 0 && transform(3, 1) == 0 && transform(3, 2) == 0 && transform(3, 3) == 1;
   return has_last_row && error <= kMaxRotationError && cv::determinant(rotation) > 0;
 }
 

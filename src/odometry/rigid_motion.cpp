@@ -6,23 +6,27 @@
 
 namespace loopbit::rigid {
 
-cv::Vec3d translation(const cv::Matx44d& T) { return {T(0, 3), T(1, 3), T(2, 3)}; }
-
-double angle(const cv::Matx44d& T) {
-  const cv::Vec3d axis(T(2, 1) - T(1, 2), T(0, 2) - T(2, 0), T(1, 0) - T(0, 1));
-  return std::atan2(cv::norm(axis) / 2, (T(0, 0) + T(1, 1) + T(2, 2) - 1) / 2);
+cv::Vec3d translation(const cv::Matx44d& transform) {
+  return {transform(0, 3), transform(1, 3), transform(2, 3)};
 }
 
-cv::Matx44d inverse(const cv::Matx44d& T) {
-  const cv::Matx33d back = T.get_minor<3, 3>(0, 0).t();
-  const cv::Vec3d t = -(back * translation(T));
+double angle(const cv::Matx44d& transform) {
+  const cv::Vec3d axis(transform(2, 1) - transform(1, 2), transform(0, 2) - transform(2, 0),
+                       transform(1, 0) - transform(0, 1));
+  return std::atan2(cv::norm(axis) / 2,
+                    (transform(0, 0) + transform(1, 1) + transform(2, 2) - 1) / 2);
+}
+
+cv::Matx44d inverse(const cv::Matx44d& transform) {
+  const cv::Matx33d back = transform.get_minor<3, 3>(0, 0).t();
+  const cv::Vec3d t = -(back * translation(transform));
   return {back(0, 0), back(0, 1), back(0, 2), t[0], back(1, 0), back(1, 1), back(1, 2), t[1],
           back(2, 0), back(2, 1), back(2, 2), t[2], 0,          0,          0,          1};
 }
 
-cv::Matx66d adjoint(const cv::Matx44d& T) {
-  const cv::Matx33d rotation = T.get_minor<3, 3>(0, 0);
-  const cv::Vec3d t = translation(T);
+cv::Matx66d adjoint(const cv::Matx44d& transform) {
+  const cv::Matx33d rotation = transform.get_minor<3, 3>(0, 0);
+  const cv::Vec3d t = translation(transform);
   const cv::Matx33d cross(0, -t[2], t[1], t[2], 0, -t[0], -t[1], t[0], 0);
   const cv::Matx33d lever = cross * rotation;
   cv::Matx66d adjoint = cv::Matx66d::zeros();
