@@ -44,11 +44,11 @@ class Joined {
 
 }  // namespace
 
-LoopGraph::Impl::Impl(const LoopGraphOptions& options) : options_(options) {
+GraphImpl::GraphImpl(const LoopGraphOptions& options) : options_(options) {
   validate(options, "graph");
 }
 
-int LoopGraph::Impl::add_keyframe(const std::optional<Edge>& odometry) {
+int GraphImpl::add_keyframe(const std::optional<Edge>& odometry) {
   const int number = static_cast<int>(keyframes_.size());
   Keyframe keyframe{.chain = number, .odometry = odometry};
   Pose pose = graph::kIdentity;
@@ -65,7 +65,7 @@ int LoopGraph::Impl::add_keyframe(const std::optional<Edge>& odometry) {
   return number;
 }
 
-int LoopGraph::Impl::add_loop(const LoopEdge& loop, const Edge& edge) {
+int GraphImpl::add_loop(const LoopEdge& loop, const Edge& edge) {
   edges_.push_back(edge);
   wide_.push_back(graph::wide_loop(edge, options_.seen_within_m));
   loops_.push_back({.edge = loop, .limit = limit(edge.known)});
@@ -73,21 +73,21 @@ int LoopGraph::Impl::add_loop(const LoopEdge& loop, const Edge& edge) {
   return static_cast<int>(loops_.size()) - 1;
 }
 
-double LoopGraph::Impl::limit(PoseKnown known) const {
+double GraphImpl::limit(PoseKnown known) const {
   return graph::chi2_limit(options_.confidence, graph::freedom_of(known));
 }
 
-double LoopGraph::Impl::chi2(std::size_t loop) const {
+double GraphImpl::chi2(std::size_t loop) const {
   const Edge& edge = edges_[loop];
   return graph::chi2_of(edge, poses_[index(edge.from)], poses_[index(edge.to)],
                         options_.seen_within_m);
 }
 
-void LoopGraph::Impl::measure_chi2() {
+void GraphImpl::measure_chi2() {
   for (std::size_t i = 0; i < loops_.size(); ++i) loops_[i].chi2 = chi2(i);
 }
 
-double LoopGraph::Impl::cost() const {
+double GraphImpl::cost() const {
   double sum = 0;
   for (const Keyframe& keyframe : keyframes_) {
     if (!keyframe.odometry) continue;
@@ -99,7 +99,7 @@ double LoopGraph::Impl::cost() const {
   return sum / 2;
 }
 
-std::vector<std::size_t> LoopGraph::Impl::of_verdict(LoopVerdict verdict) const {
+std::vector<std::size_t> GraphImpl::of_verdict(LoopVerdict verdict) const {
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < loops_.size(); ++i) {
     if (loops_[i].verdict == verdict) found.push_back(i);
@@ -107,7 +107,7 @@ std::vector<std::size_t> LoopGraph::Impl::of_verdict(LoopVerdict verdict) const 
   return found;
 }
 
-void LoopGraph::Impl::solve() {
+void GraphImpl::solve() {
   // What odometry alone makes impossible.
   reject_unreachable();
   // What most loops nearby contradict.
@@ -124,7 +124,7 @@ void LoopGraph::Impl::solve() {
   }
 }
 
-void LoopGraph::Impl::reject_unreachable() {
+void GraphImpl::reject_unreachable() {
   const double limit = graph::chi2_limit(options_.confidence, 6);
   for (JudgedLoop& loop : loops_) {
     const bool is_reachable = loop.odometry_chi2.value_or(0) <= limit;
@@ -132,7 +132,7 @@ void LoopGraph::Impl::reject_unreachable() {
   }
 }
 
-void LoopGraph::Impl::reject_inconsistent() {
+void GraphImpl::reject_inconsistent() {
   const std::vector<std::size_t> reachable = of_verdict(LoopVerdict::kept);
   std::vector<graph::WideLoop> wide;
   wide.reserve(reachable.size());
@@ -147,7 +147,7 @@ void LoopGraph::Impl::reject_inconsistent() {
   }
 }
 
-void LoopGraph::Impl::start_from_odometry() {
+void GraphImpl::start_from_odometry() {
   for (std::size_t i = 0; i < poses_.size(); ++i) poses_[i] = keyframes_[i].reckoned;
   // A chain is moved to where the loop says that has most others on its side.
   std::vector<std::size_t> kept = of_verdict(LoopVerdict::kept);
@@ -185,7 +185,7 @@ void LoopGraph::Impl::start_from_odometry() {
   }
 }
 
-std::vector<int> LoopGraph::Impl::roots() const {
+std::vector<int> GraphImpl::roots() const {
   Joined joined(keyframes_.size());
   for (const Keyframe& keyframe : keyframes_) {
     if (keyframe.odometry) joined.join(keyframe.odometry->from, keyframe.odometry->to);
@@ -200,7 +200,7 @@ std::vector<int> LoopGraph::Impl::roots() const {
   return found;
 }
 
-void LoopGraph::Impl::solve_kept() {
+void GraphImpl::solve_kept() {
   const std::vector<std::size_t> kept = of_verdict(LoopVerdict::kept);
   std::vector<Edge> odometry;
   std::vector<Edge> loops;
@@ -219,7 +219,7 @@ void LoopGraph::Impl::solve_kept() {
   }
 }
 
-void LoopGraph::Impl::keep_what_fits() {
+void GraphImpl::keep_what_fits() {
   bool any = false;
   for (const std::size_t i : of_verdict(LoopVerdict::inconsistent)) {
     if (chi2(i) > loops_[i].limit) continue;
@@ -229,7 +229,7 @@ void LoopGraph::Impl::keep_what_fits() {
   if (any) solve_whole();
 }
 
-void LoopGraph::Impl::update() {
+void GraphImpl::update() {
   const bool is_new = judged_ < loops_.size();
   const bool bends = judge_new_loops();
   if (is_new) solve_window();
@@ -255,7 +255,7 @@ void LoopGraph::Impl::update() {
 }
 
 /// Whether kept loops contradict the estimate.
-bool LoopGraph::Impl::judge_new_loops() {
+bool GraphImpl::judge_new_loops() {
   const double limit = graph::chi2_limit(options_.confidence, 6);
   bool waits = false;
   for (std::size_t i = judged_; i < loops_.size(); ++i) {
@@ -272,7 +272,7 @@ bool LoopGraph::Impl::judge_new_loops() {
 }
 
 /// Keeps new loops that contradict the estimate if an earlier one that waits agrees with them.
-bool LoopGraph::Impl::confirm_waiting_loops() {
+bool GraphImpl::confirm_waiting_loops() {
   constexpr std::size_t kReach = 20;
   const double limit = graph::chi2_limit(options_.confidence, 6);
   const std::size_t begin = judged_ < kReach ? 0 : judged_ - kReach;
@@ -293,7 +293,7 @@ bool LoopGraph::Impl::confirm_waiting_loops() {
   return any;
 }
 
-void LoopGraph::Impl::solve_window() {
+void GraphImpl::solve_window() {
   constexpr int kIterations = 5;
   const int end = static_cast<int>(poses_.size());
   const int begin = std::max(0, std::min(end - options_.window, last_kept_query_));
@@ -317,7 +317,7 @@ void LoopGraph::Impl::solve_window() {
   problem.solve(kIterations);
 }
 
-void LoopGraph::Impl::solve_whole() {
+void GraphImpl::solve_whole() {
   constexpr int kIterations = 10;
   const auto solve_once = [&] {
     graph::PoseProblem problem(poses_, options_.seen_within_m);
@@ -338,9 +338,9 @@ void LoopGraph::Impl::solve_whole() {
   if (any) solve_once();
 }
 
-void LoopGraph::Impl::set_pose(int keyframe, const Pose& pose) { poses_[index(keyframe)] = pose; }
+void GraphImpl::set_pose(int keyframe, const Pose& pose) { poses_[index(keyframe)] = pose; }
 
-void LoopGraph::Impl::set_verdict(int loop, LoopVerdict verdict) {
+void GraphImpl::set_verdict(int loop, LoopVerdict verdict) {
   loops_[index(loop)].verdict = verdict;
 }
 

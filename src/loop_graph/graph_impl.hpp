@@ -20,9 +20,9 @@ Edge edge_of(const LoopEdge& loop, const LoopGraphOptions& options);
 }  // namespace graph
 
 /// See LoopGraph. Loops have the same number in loops(), edges() and wide_.
-class [[gnu::visibility("hidden")]] LoopGraph::Impl {
+class GraphImpl {
  public:
-  explicit Impl(const LoopGraphOptions& options);
+  explicit GraphImpl(const LoopGraphOptions& options);
 
   int add_keyframe(const std::optional<graph::Edge>& odometry);
   int add_loop(const LoopEdge& loop, const graph::Edge& edge);
@@ -70,6 +70,12 @@ class [[gnu::visibility("hidden")]] LoopGraph::Impl {
   std::vector<graph::WideLoop> wide_;  ///< of loops
   std::size_t judged_ = 0;             ///< loops that update() has seen
   int last_kept_query_ = 0;            ///< where update() solved loops last
+};
+
+/// Has no code of its own: being part of a public class, it would be visible.
+class LoopGraph::Impl final : public GraphImpl {
+ public:
+  using GraphImpl::GraphImpl;
 };
 
 }  // namespace loopbit
