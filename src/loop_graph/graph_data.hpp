@@ -22,7 +22,7 @@ using Pose = std::array<double, 7>;
 
 inline constexpr Pose kIdentity{0, 0, 0, 0, 0, 0, 1};
 
-Pose pose_of(const cv::Matx44d& T);
+Pose pose_of(const cv::Matx44d& transform);
 cv::Matx44d matrix_of(const Pose& pose);
 /// x_a = T_a_b x_b, with T_a_b = T_w_a^-1 T_w_b.
 Pose between(const Pose& a, const Pose& b);

@@ -66,12 +66,12 @@ std::int64_t least_frames(const MatchList& list, const std::optional<GroundTruth
 
 /// Throws Error (kind input) if a page cannot show that many.
 int checked(std::int64_t frames, const std::string& name) {
-  constexpr std::int64_t kMaxFrames = 2'000'000;
-  if (frames <= kMaxFrames) return static_cast<int>(frames);
+  constexpr std::int64_t kMaxShown = 2'000'000;
+  if (frames <= kMaxShown) return static_cast<int>(frames);
   throw Error(ErrorKind::input,
               fmt::format("'{}' has {} frames, but a page shows at most {}; leave out frames, "
                           "or use 'loopbit eval', which needs none.",
-                          name, frames, kMaxFrames));
+                          name, frames, kMaxShown));
 }
 
 /// If a detector lists no frames, uses those of the other runs on the same images, or the number of
