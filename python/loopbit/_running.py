@@ -129,6 +129,7 @@ def run_folder(
     camera: Path | None = None,
     depth: Path | None = None,
     depth_scale: float = 5000.0,
+    odometry: Path | None = None,
     keep_images: bool = False,
     map_cache_mb: int | None = None,
     overwrite: bool = False,
@@ -156,6 +157,8 @@ def run_folder(
     depth: a folder of depth images, so that relative poses are in metres: with names like those of
     the images, or a TUM RGB-D folder with its depth.txt. 16-bit depth has depth_scale units per
     metre.
+    odometry: a file of poses of the camera by odometry: TUM, KITTI, EuRoC, or TUM with covariances.
+    options.odometry says how fast it drifts.
     Files count all frames of the sequence, whatever part of it is read.
 
     Arguments are checked before the first frame as far as possible. If truth or positions turn out
@@ -184,6 +187,7 @@ def run_folder(
         camera=camera or "",
         depth=depth or "",
         depth_scale=depth_scale,
+        odometry=odometry or "",
     ), on_bad_frame)
 
 

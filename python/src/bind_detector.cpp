@@ -167,6 +167,13 @@ void bind_detection(py::module_& module) {
       .def_readonly("withdrawn_loops", &Detection::withdrawn_loops,
                     "Loops reported before that are more likely wrong than right after this "
                     "frame. List of LateLoop.")
+      .def_property_readonly(
+          "odometry",
+          [](const Detection& self) {
+            return self.odometry ? std::optional(square_of(self.odometry->T_odometry_camera))
+                                 : std::nullopt;
+          },
+          "The pose of the camera that was passed to process(), shape (4, 4); None without one.")
       .def_property_readonly("name", text_of(&Detection::name),
                              "The name of the image in its source; empty without a source.")
       .def_property_readonly(
@@ -237,19 +244,39 @@ void bind_evidence(py::module_& module) {
 
 }  // namespace
 
+namespace {
+
+/// Throws ValueError for a covariance without a pose.
+std::optional<OdometryPose> to_odometry(const std::optional<MatrixArgument>& pose,
+                                        const std::optional<MatrixArgument>& covariance) {
+  if (!pose) {
+    if (!covariance) return std::nullopt;
+    throw py::value_error("odometry_covariance belongs to odometry; give both, or neither.");
+  }
+  OdometryPose odometry{to_matx<4>(*pose, "odometry")};
+  if (covariance) odometry.covariance = to_matx<6>(*covariance, "odometry_covariance");
+  return odometry;
+}
+
+}  // namespace
+
 SharedDetector::SharedDetector(const std::optional<LoopDetectorOptions>& options,
                                const std::shared_ptr<SharedMap>& map)
     : detector_(options_for(options, map.get()), map) {}
 
 Detection SharedDetector::process(ImageArgument image, std::optional<double> timestamp_s,
-                                  Evidence* evidence, const AllowedArgument& allowed) {
+                                  Evidence* evidence, const AllowedArgument& allowed,
+                                  const std::optional<MatrixArgument>& odometry,
+                                  const std::optional<MatrixArgument>& odometry_covariance) {
   const cv::Mat pixels = to_image(image, "image");
   const Allowed places(allowed);
+  const auto pose = to_odometry(odometry, odometry_covariance);
   Detection detection;
   Evidence seen;
   {
     const Answering guard(mutex_, is_answering_);
-    detection = detector_.process(pixels, timestamp_s, evidence ? &seen : nullptr, places.places());
+    detection =
+        detector_.process(pixels, timestamp_s, pose, evidence ? &seen : nullptr, places.places());
   }
   // With the GIL, because other threads may read it.
   if (evidence) *evidence = std::move(seen);
@@ -272,9 +299,12 @@ Detection SharedDetector::query(ImageArgument image, std::optional<double> times
   return detection;
 }
 
-Detection SharedDetector::skip(std::optional<double> timestamp_s) {
+Detection SharedDetector::skip(std::optional<double> timestamp_s,
+                               const std::optional<MatrixArgument>& odometry,
+                               const std::optional<MatrixArgument>& odometry_covariance) {
+  const auto pose = to_odometry(odometry, odometry_covariance);
   const Answering guard(mutex_, is_answering_);
-  return detector_.skip(timestamp_s);
+  return detector_.skip(timestamp_s, pose);
 }
 
 void SharedDetector::remove(const PlaceArgument& place) {
@@ -330,13 +360,18 @@ void bind_detector(py::module_& module) {
            "OptionError if the map was made with other settings of binary_content or surf.")
       .def("process", &SharedDetector::process, py::arg("image"),
            py::arg("timestamp_s") = py::none(), py::arg("evidence") = py::none(),
-           py::arg("allowed") = py::none(),
+           py::arg("allowed") = py::none(), py::arg("odometry") = py::none(),
+           py::arg("odometry_covariance") = py::none(),
            "Detects a loop, then adds the image as the next place. The image is uint8 or uint16, "
            "(h, w), BGR or BGRA, at least 32 x 32; it is not copied if its rows are contiguous. "
            "timestamp_s must not go back. If evidence is given, it is filled. allowed restricts "
            "the candidates of this frame, for example to those near a position from GPS: a "
            "function of a SessionFrame that returns whether it may be one, or a sequence of "
-           "places. An int is a frame of this session, which is session 0.")
+           "places. An int is a frame of this session, which is session 0. odometry is the pose of "
+           "the camera (x right, y down, z forward) in any fixed frame, in metres, shape (4, 4); "
+           "odometry_covariance that of the motion (x, y, z, rx, ry, rz) since the last frame with "
+           "odometry, shape (6, 6), in the frame of the camera. Without it, the settings of "
+           "odometry tell how fast it drifts.")
       .def("query", &query, py::arg("image"), py::arg("timestamp_s") = py::none(),
            py::arg("ranking") = py::none(), py::arg("evidence") = py::none(),
            py::arg("allowed") = py::none(),
@@ -345,7 +380,9 @@ void bind_detector(py::module_& module) {
            "takes longer. Only the first can be a loop. evidence and allowed are those of "
            "process().")
       .def("skip", &SharedDetector::skip, py::arg("timestamp_s") = py::none(),
-           "Counts a frame without a usable image, so that frame numbers stay aligned.")
+           py::arg("odometry") = py::none(), py::arg("odometry_covariance") = py::none(),
+           "Counts a frame without a usable image, so that frame numbers stay aligned. For "
+           "odometry see process().")
       .def("remove", &SharedDetector::remove, py::arg("place"),
            "Removes a place, such as a culled key frame, also from the map. It is never a "
            "candidate again and affects no answer. Frames keep their numbers. An int is a frame of "

@@ -10,6 +10,7 @@
 #include "loopbit/loop_detector.hpp"
 
 #include "numpy_image.hpp"
+#include "numpy_matrix.hpp"
 #include "place_argument.hpp"
 #include "shared_map.hpp"
 
@@ -25,12 +26,14 @@ class SharedDetector {
                  const std::shared_ptr<SharedMap>& map);
 
   Detection process(ImageArgument image, std::optional<double> timestamp_s, Evidence* evidence,
-                    const AllowedArgument& allowed);
+                    const AllowedArgument& allowed, const std::optional<MatrixArgument>& odometry,
+                    const std::optional<MatrixArgument>& odometry_covariance);
   /// Fills `ranking` and `evidence` unless they are null.
   [[nodiscard]] Detection query(ImageArgument image, std::optional<double> timestamp_s,
                                 std::vector<RankedPlace>* ranking, Evidence* evidence,
                                 const AllowedArgument& allowed) const;
-  Detection skip(std::optional<double> timestamp_s);
+  Detection skip(std::optional<double> timestamp_s, const std::optional<MatrixArgument>& odometry,
+                 const std::optional<MatrixArgument>& odometry_covariance);
   void remove(const PlaceArgument& place);
   void reject(const QueryArgument& query, const std::optional<PlaceArgument>& match);
   [[nodiscard]] Features features_of(const PlaceArgument& place) const;

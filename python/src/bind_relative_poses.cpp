@@ -18,19 +18,13 @@
 
 #include "bindings.hpp"
 #include "numpy_image.hpp"
+#include "numpy_matrix.hpp"
 #include "settings.hpp"
 
 namespace loopbit::python {
 namespace {
 
 namespace py = pybind11;
-
-template <int kSize>
-py::array_t<double> square_of(const cv::Matx<double, kSize, kSize>& matrix) {
-  py::array_t<double> array({kSize, kSize});
-  std::copy(std::begin(matrix.val), std::end(matrix.val), array.mutable_data());
-  return array;
-}
 
 /// Shares the memory of `depth_m` if its rows are contiguous; valid as long as `depth_m`.
 cv::Mat1f to_depth(py::array& depth_m) {

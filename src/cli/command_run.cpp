@@ -131,6 +131,11 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
       ->capture_default_str()
       ->check(number(1e-3, 1e6))
       ->needs(depth);
+  command
+      ->add_option("--odometry", flags->session.run.odometry,
+                   "Poses of the camera by odometry (TUM, KITTI, EuRoC, or TUM with covariances), "
+                   "matched by time or row. --set odometry.NAME=VALUE says how fast it drifts")
+      ->type_name("FILE");
   command->add_flag("--no-poses", flags->no_poses, "Measure no relative poses")
       ->excludes(camera)
       ->excludes(depth);

@@ -101,6 +101,7 @@ class LoopDetector::Impl {
  public:
   Impl(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
       : options_(options),
+        odometry_(options.odometry),
         memory_(std::move(map)),
         filter_({[this](PlaceId place) { return origin(place); },
                  [this](const SessionFrame& at) { return find(at); },
@@ -121,6 +122,12 @@ class LoopDetector::Impl {
       known_loops_.add(step, earlier_step);
     });
   }
+
+  /// What comes with an image.
+  struct Given {
+    std::optional<double> timestamp_s;
+    const std::optional<OdometryPose>& odometry;
+  };
 
   /// One frame as the detector sees it: all that remember() needs.
   struct Observation {
@@ -147,10 +154,9 @@ class LoopDetector::Impl {
   }
 
   /// The algorithm of Wang et al. 2019, section III.
-  Detection detect(const cv::Mat& image, std::optional<double> timestamp_s,
-                   const AllowedPlaces& allowed, Observation& seen) const {
-    check_time(timestamp_s);
-    Detection detection{.frame = size(), .timestamp_s = timestamp_s};
+  Detection detect(const cv::Mat& image, const Given& given, const AllowedPlaces& allowed,
+                   Observation& seen) const {
+    Detection detection = unanswered(given);
     Stopwatch stopwatch;
 
     // Step 1: what the image is recognised by.
@@ -168,9 +174,8 @@ class LoopDetector::Impl {
   }
 
   /// The same for an observation whose content and features are known.
-  Detection detect(std::optional<double> timestamp_s, Observation& seen) const {
-    check_time(timestamp_s);
-    Detection detection{.frame = size(), .timestamp_s = timestamp_s};
+  Detection detect(const Given& given, Observation& seen) const {
+    Detection detection = unanswered(given);
     recognise(seen, {}, detection);
     return detection;
   }
@@ -274,8 +279,12 @@ class LoopDetector::Impl {
   }
 
   /// Never throws for its time, so that one bad frame cannot end a drive.
-  Detection skip(std::optional<double> timestamp_s) {
-    Detection detection{.frame = size(), .timestamp_s = timestamp_s, .status = Status::unreadable};
+  Detection skip(const Given& given) {
+    check(given.odometry);
+    Detection detection{.frame = size(),
+                        .timestamp_s = given.timestamp_s,
+                        .status = Status::unreadable,
+                        .odometry = given.odometry};
     add_place(BinaryContent{}, Features{}, detection, cv::Mat());
     return detection;
   }
@@ -366,6 +375,17 @@ class LoopDetector::Impl {
     return memory_.earlier_steps() + (end == 0 ? 0 : recent_view_.step_of(end - 1) + 1);
   }
 
+  /// The answer before there is any. Throws Error (kind input) for what cannot be used.
+  [[nodiscard]] Detection unanswered(const Given& given) const {
+    check_time(given.timestamp_s);
+    check(given.odometry);
+    return {.frame = size(), .timestamp_s = given.timestamp_s, .odometry = given.odometry};
+  }
+
+  void check(const std::optional<OdometryPose>& odometry) const {
+    if (odometry) check_odometry(*odometry, fmt::format("The odometry of frame {}", size()));
+  }
+
   void check_time(std::optional<double> timestamp_s) const {
     if (options_.exclusion.seconds <= 0) return;
     if (!timestamp_s || !std::isfinite(*timestamp_s)) {
@@ -386,6 +406,7 @@ class LoopDetector::Impl {
   PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection,
                     const cv::Mat& image) {
     index_.reserve_next();
+    odometry_.reserve_next();
     // The time of a frame that nothing matches may be wrong, and would shut out those after it.
     const double last_s =
         times_s_.empty() ? -std::numeric_limits<double>::infinity() : times_s_.back();
@@ -397,6 +418,7 @@ class LoopDetector::Impl {
       times_s_.pop_back();
       throw;
     }
+    odometry_.add(detection.odometry);
     return index_.add(content);
   }
 
@@ -583,6 +605,7 @@ class LoopDetector::Impl {
   }
 
   LoopDetectorOptions options_;
+  OdometryTrack odometry_;  ///< of this session
   PlaceIndex index_;
   PlaceMemory memory_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
@@ -605,19 +628,26 @@ LoopDetector& LoopDetector::operator=(LoopDetector&&) noexcept = default;
 
 Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s,
                                 Evidence* evidence, const AllowedPlaces& allowed) {
+  return process(image, timestamp_s, std::nullopt, evidence, allowed);
+}
+
+Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s,
+                                const std::optional<OdometryPose>& odometry, Evidence* evidence,
+                                const AllowedPlaces& allowed) {
   Impl::Observation seen = impl_->observation();
-  Detection detection = impl_->detect(image, timestamp_s, allowed, seen);
+  Detection detection = impl_->detect(image, {timestamp_s, odometry}, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
   impl_->remember(std::move(seen), detection, image);
   return detection;
 }
 
 Detection LoopDetector::process(const BinaryContent& content, Features features,
-                                std::optional<double> timestamp_s) {
+                                std::optional<double> timestamp_s,
+                                const std::optional<OdometryPose>& odometry) {
   Impl::Observation seen = impl_->observation();
   seen.content = content;
   seen.features = std::move(features);
-  Detection detection = impl_->detect(timestamp_s, seen);
+  Detection detection = impl_->detect({timestamp_s, odometry}, seen);
   impl_->remember(std::move(seen), detection, cv::Mat());
   return detection;
 }
@@ -626,13 +656,16 @@ Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timest
                               std::vector<RankedPlace>* ranking, Evidence* evidence,
                               const AllowedPlaces& allowed) const {
   Impl::Observation seen = impl_->observation();
-  Detection detection = impl_->detect(image, timestamp_s, allowed, seen);
+  Detection detection = impl_->detect(image, {timestamp_s, std::nullopt}, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
   if (ranking) *ranking = impl_->ranked(seen, detection);
   return detection;
 }
 
-Detection LoopDetector::skip(std::optional<double> timestamp_s) { return impl_->skip(timestamp_s); }
+Detection LoopDetector::skip(std::optional<double> timestamp_s,
+                             const std::optional<OdometryPose>& odometry) {
+  return impl_->skip({timestamp_s, odometry});
+}
 
 void LoopDetector::remove(const SessionFrame& place) { impl_->remove(place); }
 

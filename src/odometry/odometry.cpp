@@ -97,6 +97,10 @@ void OdometryTrack::add(const std::optional<OdometryPose>& pose) {
   frames_.push_back(frame);
 }
 
+void OdometryTrack::reserve_next() {
+  if (frames_.size() == frames_.capacity()) frames_.reserve(2 * frames_.size() + 1);
+}
+
 std::optional<Motion> OdometryTrack::between(int from, int to) const {
   const Frame& a = frames_.at(static_cast<std::size_t>(from));
   const Frame& b = frames_.at(static_cast<std::size_t>(to));

@@ -16,6 +16,7 @@
 
 #include "depth_folder.hpp"
 #include "evidence_writer.hpp"
+#include "odometry_file.hpp"
 #include "pose_file.hpp"
 #include "run_files.hpp"
 #include "run_folder.hpp"
@@ -53,7 +54,7 @@ void check_from_start(const RunInput& input, const RunRequest& request) {
   if (input.taken() == 0) return;
   const ScoringRequest& scoring = request.scoring;
   for (const std::string& file :
-       {scoring.truth, scoring.not_false, scoring.ignore, request.poses}) {
+       {scoring.truth, scoring.not_false, scoring.ignore, request.poses, request.odometry}) {
     if (file.empty()) continue;
     throw Error(ErrorKind::option,
                 fmt::format("'{}' counts from the first frame, but {} frames of '{}' were already "
@@ -98,6 +99,7 @@ RunRecord record_of(const RunInput& input, const RunRequest& request) {
           .stopped_by = kRunning,
           .arguments = request.arguments,
           .camera = request.camera ? request.camera_file : "",
+          .odometry = request.odometry,
           .truth = truth.empty() ? request.truth_description : truth};
 }
 
@@ -125,6 +127,13 @@ std::optional<DepthFolder> depth_of(const RunRequest& request,
   DepthFolder depth(request.depth, request.depth_scale);
   depth.check(camera->size_px);
   return depth;
+}
+
+/// None without a file.
+std::optional<OdometryFile> odometry_of(RunInput& input, const RunRequest& request,
+                                        const FramesRead& frames) {
+  if (request.odometry.empty()) return std::nullopt;
+  return OdometryFile(request.odometry, frames, input.prove());
 }
 
 /// Null without a map.
@@ -157,7 +166,7 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
   std::vector<std::string> inputs = request.other_inputs;
   const ScoringRequest& scoring = request.scoring;
   inputs.insert(inputs.end(), {input.input(), scoring.truth, scoring.not_false, scoring.ignore,
-                               request.poses, request.camera_file});
+                               request.poses, request.camera_file, request.odometry});
   if (!request.folder.empty()) return {request.folder, request.overwrite, inputs};
   const auto stem = std::filesystem::path(request.map).replace_extension().string();
   const std::string folder = fmt::format("{}_session_{}", stem, map_session);
@@ -168,11 +177,13 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
 class RecordedRun {
  public:
   RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected,
-              const std::optional<CameraModel>& camera, std::optional<DepthFolder> depth)
+              const std::optional<CameraModel>& camera, std::optional<DepthFolder> depth,
+              std::optional<OdometryFile> odometry)
       : input_(input),
         request_(request),
         camera_(camera),
         depth_(std::move(depth)),
+        odometry_(std::move(odometry)),
         frames_(std::move(expected)),
         map_(open_map(input, request)),
         detector_(std::in_place, request.options, map_),
@@ -206,7 +217,9 @@ class RecordedRun {
       };
     }
     if (listener.on_start) listener.on_start(folder_.path());
-    run(input_, detector, recording, stop);
+    FrameOdometry odometry;
+    if (odometry_) odometry = [&](const Frame& frame) { return odometry_->next(frame); };
+    run(input_, detector, recording, stop, odometry);
     record_.early_end = input_.early_end();
     if (map) map_damage_ = map->damage();
     if (evidence) evidence->finish();
@@ -223,6 +236,9 @@ class RecordedRun {
     const std::size_t expected = frames_.times_s.size();
     frames_.times_s = match_list(folder_.detections()).times_s;
     frames_.all = frames_.all && frames_.times_s.size() == expected;
+    attempt([&] {
+      if (odometry_) odometry_->check_used();
+    });
     attempt([&] { write_score(); });
     attempt([&] { write_positions(is_cut_off); });
   }
@@ -271,8 +287,9 @@ class RecordedRun {
   const RunRequest& request_;
   std::optional<CameraModel> camera_;
   std::optional<DepthFolder> depth_;  ///< until detect()
-  FramesRead frames_;                 ///< expected, then read
-  std::shared_ptr<MapWriter> map_;    ///< null without one, and after detect()
+  std::optional<OdometryFile> odometry_;
+  FramesRead frames_;               ///< expected, then read
+  std::shared_ptr<MapWriter> map_;  ///< null without one, and after detect()
   std::optional<LoopDetector> detector_;
   RunRecord record_;
   RunFolder folder_;
@@ -290,7 +307,8 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
     check_time(input.prove(), request.options);
   }
   const std::optional<CameraModel> camera = camera_of(input, request);
-  RecordedRun run(input, request, expected, camera, depth_of(request, camera));
+  RecordedRun run(input, request, expected, camera, depth_of(request, camera),
+                  odometry_of(input, request, expected));
   try {
     run.detect(listener, stop);
   } catch (const std::exception& error) {

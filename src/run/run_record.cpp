@@ -77,6 +77,7 @@ void transfer(Io& io, Record& record) {
   io.unless(std::string(), "/map/path", record.map_path);
   io.unless(0, "/map/session", record.map_session);
   io.unless(std::string(), "/camera", record.camera);
+  io.unless(std::string(), "/odometry", record.odometry);
   io.unless(std::string(), "/truth", record.truth);
   io.unless(1, "/truth_every", record.truth_every, 1);
   if (record.results) transfer_results(io, record, *record.results);

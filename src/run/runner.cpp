@@ -18,23 +18,25 @@ void check_time(const Frame& frame, const LoopDetectorOptions& options) {
 }
 
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
-         const std::atomic<bool>& stop) {
+         const std::atomic<bool>& stop, const FrameOdometry& odometry) {
   bool is_first = true;
   const auto report = [&](Detection detection, const Frame& frame) {
     detection.name = frame.name;
     listener.on_detection(detection);
   };
+  std::optional<OdometryPose> pose;  // of the present frame
   const auto leave_out = [&](const Frame& frame, const std::string& reason) {
     listener.on_bad_frame(fmt::format("Frame {}: {}", detector.size(), reason));
-    report(detector.skip(frame.timestamp_s), frame);
+    report(detector.skip(frame.timestamp_s, pose), frame);
   };
   const auto detect = [&](const Frame& frame) {
+    if (odometry) pose = odometry(frame);
     if (!frame.error.empty()) return leave_out(frame, frame.error);
     if (is_first) check_time(frame, detector.options());
     Evidence evidence;
     Detection detection;
     try {
-      detection = detector.process(frame.image, frame.timestamp_s,
+      detection = detector.process(frame.image, frame.timestamp_s, pose,
                                    listener.on_evidence ? &evidence : nullptr);
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;

@@ -20,21 +20,15 @@ struct CameraPose {
   cv::Vec3d ahead;  ///< the viewing direction (the camera's z axis), unit length
 };
 
-/// Reads poses, one per row: KITTI poses (12 numbers: camera to world, 3 x 4), a TUM trajectory (8
-/// numbers: time, position, quaternion x y z w) or EuRoC states (17: time in ns, position,
-/// quaternion w x y z, 9 that are not read; of the body, not of the camera). All rows have one
-/// kind. Numbers are separated by spaces or commas; `#` begins a comment. Throws Error (kind input)
-/// with file and line.
+/// The poses of read_trajectory(). Throws as it does.
 std::vector<CameraPose> read_poses(const std::string& path);
 
 /// The pose of each frame, or none if it is unknown. If both have times, the nearest pose in time
-/// (at most kMaxPoseDelay_s away), in any order; of equal times the first row counts. Otherwise row
-/// by row. Throws Error (kind input) if neither works: no pose is near in time, or there are no
-/// times and the numbers of rows differ.
+/// (at most RowsByTime::kMaxDelay_s away), in any order; of equal times the first row counts.
+/// Otherwise row by row. Throws Error (kind input) if neither works: no pose is near in time, or
+/// there are no times and the numbers of rows differ.
 std::vector<std::optional<CameraPose>> poses_of_frames(const std::vector<CameraPose>& poses,
                                                        const FrameTimes& times_s);
-
-inline constexpr double kMaxPoseDelay_s = 0.05;
 
 /// The ground truth of poses: for each frame, the earlier frames that satisfy `options`. near_place
 /// has those within the grey radius, whatever their heading, gap or path (and all of same_place).

@@ -17,6 +17,7 @@ namespace loopbit::truth {
 inline constexpr std::size_t kTumColumns = 8;
 inline constexpr std::size_t kKittiColumns = 12;
 inline constexpr std::size_t kEurocColumns = 17;
+inline constexpr std::size_t kCovarianceColumns = 29;
 
 /// Whether any of the frames has a time.
 bool has_times(const FramesRead& frames);

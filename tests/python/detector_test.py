@@ -209,3 +209,22 @@ def test_threads_may_share_a_detector(images):
     for thread in threads:
         thread.join()
     assert len(detector) == 80
+
+
+def test_odometry(images):
+    detector = loopbit.LoopDetector()
+    pose = np.eye(4)
+    pose[0, 3] = 2.5
+    first = detector.process(images[0], odometry=pose)
+    assert (first.odometry == pose).all()
+    pose[0, 3] = 3.5
+    assert detector.process(images[1], odometry=pose, odometry_covariance=np.eye(6)).frame == 1
+    assert (detector.skip(odometry=pose).odometry == pose).all()
+    assert detector.process(images[2]).odometry is None
+    with pytest.raises(ValueError, match=r"odometry has shape \(3, 4\)"):
+        detector.process(images[3], odometry=pose[:3])
+    with pytest.raises(ValueError, match="give both"):
+        detector.process(images[3], odometry_covariance=np.eye(6))
+    with pytest.raises(loopbit.InputError, match="odometry of frame 4 is not a rigid motion"):
+        detector.process(images[3], odometry=2 * pose)
+    assert len(detector) == 4

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "loopbit/odometry.hpp"
 #include "loopbit/place_index.hpp"
 
 namespace loopbit {
@@ -88,6 +89,7 @@ struct Detection {
   std::vector<LateLoop> late_loops = {};
   /// Loops reported before, also late ones, that are more likely wrong than right after this frame.
   std::vector<LateLoop> withdrawn_loops = {};
+  std::optional<OdometryPose> odometry = std::nullopt;  ///< what process() was given
   std::string name = {};  ///< of the image in its source; run() sets it
 };
 

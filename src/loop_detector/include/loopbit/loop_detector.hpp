@@ -69,13 +69,21 @@ class LoopDetector {
   Detection process(const cv::Mat& image, std::optional<double> timestamp_s = std::nullopt,
                     Evidence* evidence = nullptr, const AllowedPlaces& allowed = {});
 
+  /// The same with what odometry says of the camera at this frame, if it says anything. Throws
+  /// Error (kind input) for that, too, see check_odometry().
+  Detection process(const cv::Mat& image, std::optional<double> timestamp_s,
+                    const std::optional<OdometryPose>& odometry, Evidence* evidence = nullptr,
+                    const AllowedPlaces& allowed = {});
+
   /// The same for an image whose content and features a MapStorage received in an earlier run. They
   /// give the answer that the image itself would give.
   Detection process(const BinaryContent& content, Features features,
-                    std::optional<double> timestamp_s = std::nullopt);
+                    std::optional<double> timestamp_s = std::nullopt,
+                    const std::optional<OdometryPose>& odometry = std::nullopt);
 
-  /// The answer of process(), without adding the image. `ranking`: if not null, receives all
-  /// candidates, best first, at the cost of verifying each of them. Only the first can be a loop.
+  /// The answer of process() without odometry, without adding the image. `ranking`: if not null,
+  /// receives all candidates, best first, at the cost of verifying each of them. Only the first can
+  /// be a loop.
   [[nodiscard]] Detection query(const cv::Mat& image,
                                 std::optional<double> timestamp_s = std::nullopt,
                                 std::vector<RankedPlace>* ranking = nullptr,
@@ -83,8 +91,9 @@ class LoopDetector {
                                 const AllowedPlaces& allowed = {}) const;
 
   /// Counts a frame that has no usable image, so that frame numbers match the camera's. It is never
-  /// a candidate.
-  Detection skip(std::optional<double> timestamp_s = std::nullopt);
+  /// a candidate. Throws Error (kind input) for odometry, see check_odometry().
+  Detection skip(std::optional<double> timestamp_s = std::nullopt,
+                 const std::optional<OdometryPose>& odometry = std::nullopt);
 
   /// Removes a place, such as a culled key frame, also from the map. From now on it is no candidate
   /// and affects no answer. Frames keep their numbers. Removing it again changes nothing. Throws

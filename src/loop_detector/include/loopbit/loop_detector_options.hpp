@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "loopbit/binary_content.hpp"
+#include "loopbit/odometry.hpp"
 #include "loopbit/options.hpp"
 #include "loopbit/place_index.hpp"
 #include "loopbit/surf.hpp"
@@ -65,6 +66,7 @@ struct LoopDetectorOptions {
   VerificationOptions verification;
   ExclusionOptions exclusion;
   DecisionOptions decision;
+  OdometryDrift odometry;
 };
 
 /// Calls visit(name, part) for each part of `options` (const or not), in order.
@@ -76,6 +78,7 @@ void for_each_section(Options& options, Visit&& visit) {
   visit("verification", options.verification);
   visit("exclusion", options.exclusion);
   visit("decision", options.decision);
+  visit("odometry", options.odometry);
 }
 
 /// The names that preset() knows.

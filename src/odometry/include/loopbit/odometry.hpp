@@ -72,6 +72,9 @@ class OdometryTrack {
   /// check_odometry(); the track is then unchanged.
   void add(const std::optional<OdometryPose>& pose);
 
+  /// Takes the memory that the next add() needs, so that it only throws for a bad pose.
+  void reserve_next();
+
   /// The motion between two frames. None if odometry is not known at one of them. The covariance
   /// adds up the drift of all steps between them. Constant time.
   [[nodiscard]] std::optional<Motion> between(int from, int to) const;

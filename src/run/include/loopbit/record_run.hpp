@@ -48,7 +48,10 @@ struct RunRequest {
   /// A folder of depth images, so that translations get a length: of TUM RGB-D, with a depth.txt,
   /// or of images named like those of the run. Needs `camera`. Empty = none.
   std::string depth = {};
-  double depth_scale = kTumDepthUnitsPerM;     ///< 16-bit depth: units per metre
+  double depth_scale = kTumDepthUnitsPerM;  ///< 16-bit depth: units per metre
+  /// A file of camera poses by odometry, as read_trajectory() reads: tells places apart that look
+  /// alike. Empty = none.
+  std::string odometry = {};
   std::vector<std::string> other_inputs = {};  ///< more files that are never replaced
 };
 
@@ -59,7 +62,8 @@ struct RunOutcome {
   std::vector<Detection> detections;
   /// The damage that was found in the map, one clause each. Damaged rows were left out.
   std::vector<std::string> map_damage;
-  /// What turned out to be wrong with the truth or the positions. The run is kept without them.
+  /// What turned out to be wrong with the truth, the positions or the odometry. The run is kept
+  /// without them.
   std::optional<Error> fault;
 };
 
@@ -69,13 +73,13 @@ struct RunOutcome {
 ///
 /// Checks the request before it touches anything, as far as possible. The map is opened first and
 /// with `overwrite` a usable frame is read first, so that a refused run does not replace an earlier
-/// one; with a camera, too, to check its size. If the run fails, or the listener throws, run.json
-/// says why, the map has the places so far, and the exception goes on.
+/// one; with a camera or odometry, too, to check its size or time. If the run fails, or the
+/// listener throws, run.json says why, the map has the places so far, and the exception goes on.
 ///
 /// Throws Error: kind option for a request that contradicts itself or the input, or without a
-/// folder and a map; kind input for files of truth and poses, for a camera or depth that does not
-/// fit the images, and if the input has ended without a readable frame; kind output if something
-/// cannot be saved; and what MapWriter and run() throw.
+/// folder and a map; kind input for files of truth, poses and odometry, for a camera or depth that
+/// does not fit the images, and if the input has ended without a readable frame; kind output if
+/// something cannot be saved; and what MapWriter and run() throw.
 RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
                       const std::atomic<bool>& stop);
 

@@ -62,6 +62,7 @@ struct RunRecord {
       {};                      ///< of the command, without its name; empty for a library
   std::string early_end = {};  ///< of the input, see ImageSource
   std::string camera = {};     ///< calibration that measured relative poses; empty = none
+  std::string odometry = {};   ///< its file; empty = none
   std::string truth = {};      ///< description of the truth, for people
   int truth_every = 1;         ///< see GroundTruth::every
   std::optional<Evaluation> score = std::nullopt;  ///< read without its lists

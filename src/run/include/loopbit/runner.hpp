@@ -31,11 +31,14 @@ struct RunListener {
 /// frame has no time, because the others have none either.
 void check_time(const Frame& frame, const LoopDetectorOptions& options);
 
+/// What odometry says at a frame, asked in order, once for each.
+using FrameOdometry = std::function<std::optional<OdometryPose>(const Frame&)>;
+
 /// Processes `source` frame by frame to its end, or until `stop` is true. A frame that is
 /// unreadable is reported and gets the status unreadable, and the run continues. Frames may differ
-/// in size: each is scaled by itself. Errors of the listener end the run. Throws Error (kind
-/// option), see check_time().
+/// in size: each is scaled by itself. Errors of the listener end the run. `odometry`: empty = there
+/// is none. Throws Error (kind option), see check_time().
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
-         const std::atomic<bool>& stop);
+         const std::atomic<bool>& stop, const FrameOdometry& odometry = {});
 
 }  // namespace loopbit
