@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: MIT
 """What the tests of the loopbit command share. A test of it is run as
 
-    NAME_test.py LOOPBIT [--quick] [unittest arguments]
+    NAME_test.py LOOPBIT COMMAND_SERVER [--quick] [unittest arguments]
 
---quick drives in fewer, wider steps, which suits a slow build; what is found is not judged then.
+with the command and a build of command_server.cpp, which runs most calls without loading all libraries
+again. --quick drives in fewer, wider steps, which suits a slow build; what is found is not judged then.
 """
 
+import atexit
 import csv
 import os
 import pathlib
@@ -17,6 +19,7 @@ import tempfile
 import unittest
 
 LOOPBIT = pathlib.Path(sys.argv.pop(1)).resolve()
+SERVER_PROGRAM = sys.argv.pop(1)
 QUICK = "--quick" in sys.argv
 if QUICK:
     sys.argv.remove("--quick")
@@ -26,13 +29,38 @@ WORLD = ["--frames", FRAMES, "--world", "laps=2", "--world", f"spacing_m={225 / 
          "--world", "width_px=320", "--world", "height_px=240"]
 
 
-def loopbit(*arguments, environment=None, **options):
+class Server:
+    def __init__(self, program):
+        self.process = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        atexit.register(self.process.communicate)
+
+    def run(self, command, cwd, environment):
+        with tempfile.NamedTemporaryFile() as stdout, tempfile.NamedTemporaryFile() as stderr:
+            variables = [f"{name}={value}" for name, value in environment.items()]
+            strings = [cwd, stdout.name, stderr.name, str(len(variables)), *variables, *command]
+            request = b"".join(os.fsencode(text) + b"\0" for text in [str(len(strings)), *strings])
+            self.process.stdin.write(request)
+            self.process.stdin.flush()
+            code = int(self.process.stdout.readline())
+            return subprocess.CompletedProcess(command, code, stdout.read().decode(), stderr.read().decode())
+
+
+SERVER = Server(SERVER_PROGRAM)
+
+
+def loopbit(*arguments, environment=None, cwd=None, **options):
+    """Runs the command. Options are those of subprocess.run(), for which a process of its own is started."""
+    command = [str(LOOPBIT), *map(str, arguments)]
+    environment = environment or {}
+    if not options:
+        return SERVER.run(command, cwd or os.getcwd(), environment)
     return subprocess.run(
-        [LOOPBIT, *map(str, arguments)],
+        command,
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
-        env={**os.environ, **(environment or {})},
+        env={**os.environ, **environment},
+        cwd=cwd,
         **options,
     )
 

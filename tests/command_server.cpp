@@ -1,0 +1,77 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+/// The loopbit command, started once and forked for each call, because a start takes a quarter of a
+/// second for the libraries that OpenCV loads. Linked with --wrap=main, so main() of the command is
+/// __real_main().
+///
+/// A request on stdin: the number of strings, then so many strings, each with a zero byte at its
+/// end: working directory, files for stdout and stderr, the number of variables, variables as
+/// NAME=VALUE, and the arguments, beginning with the name of the program. The answer on stdout: a
+/// line with the exit code, or the negative number of the signal that ended it.
+#include <cstdio>
+#include <cstdlib>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+// NOLINTBEGIN(bugprone-reserved-identifier): the names that the linker gives.
+extern "C" int __real_main(int argc, char** argv);
+extern "C" int __wrap_main(int argc, char** argv);
+// NOLINTEND(bugprone-reserved-identifier)
+
+namespace {
+
+std::optional<std::string> next_string() {
+  std::string text;
+  for (int c = std::getchar(); c != '\0'; c = std::getchar()) {
+    if (c == EOF) return std::nullopt;
+    text += static_cast<char>(c);
+  }
+  return text;
+}
+
+std::optional<std::vector<std::string>> next_request() {
+  const std::optional<std::string> count = next_string();
+  if (!count) return std::nullopt;
+  std::vector<std::string> strings(std::stoul(*count));
+  for (std::string& text : strings) text = next_string().value();
+  return strings;
+}
+
+void redirect(int stream, const char* file, int flags) {
+  const int opened = open(file, flags, 0600);
+  if (opened < 0 || dup2(opened, stream) < 0) std::abort();
+  close(opened);
+}
+
+[[noreturn]] void run(std::vector<std::string> request) {
+  if (chdir(request[0].c_str()) != 0) std::abort();
+  redirect(STDIN_FILENO, "/dev/null", O_RDONLY);
+  redirect(STDOUT_FILENO, request[1].c_str(), O_WRONLY);
+  redirect(STDERR_FILENO, request[2].c_str(), O_WRONLY);
+  const std::size_t arguments = 4 + std::stoul(request[3]);
+  for (std::size_t i = 4; i < arguments; ++i) putenv(request[i].data());
+  std::vector<char*> argv;
+  for (std::size_t i = arguments; i < request.size(); ++i) argv.push_back(request[i].data());
+  const int count = static_cast<int>(argv.size());
+  argv.push_back(nullptr);
+  std::exit(__real_main(count, argv.data()));
+}
+
+}  // namespace
+
+int __wrap_main(int /*argc*/, char** /*argv*/) {
+  while (std::optional<std::vector<std::string>> request = next_request()) {
+    const pid_t child = fork();
+    if (child == 0) run(std::move(*request));
+    int status = 0;
+    if (child < 0 || waitpid(child, &status, 0) != child) return 1;
+    std::printf("%d\n", WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status));
+    std::fflush(stdout);
+  }
+  return 0;
+}
