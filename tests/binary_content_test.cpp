@@ -242,6 +242,29 @@ TEST(Binarize, TakesOnlyWhatExceedsGammaTimesTheMean) {
   EXPECT_EQ(count(binarize(map, 2.0)), 0);
 }
 
+TEST(Binarize, ExcludedPixelsAreNotSetAndDoNotCount) {
+  cv::Mat1f map(64, 64, 0.0F);
+  map.rowRange(0, 16).setTo(2.0);
+  map.rowRange(48, 64).setTo(100.0);
+  cv::Mat1b mask(128, 640, 255);
+  mask.rowRange(96, 128) = 0;
+  const BinaryContent excluded = excluded_pixels(mask);
+  BinaryContent expected;
+  for (std::size_t y = 0; y < 16; ++y) expected.rows[y] = ~std::uint64_t{0};
+  EXPECT_EQ(binarize(map, 2.9, excluded), expected);  // the mean of the others is 2 / 3
+  EXPECT_EQ(count(binarize(map, 3.1, excluded)), 0);
+  EXPECT_EQ(count(binarize(map, 1.5)), kPixels / 4);
+}
+
+TEST(Binarize, APixelIsExcludedIfHalfOfItIs) {
+  cv::Mat1b mask(640, 640, 1);  // 10 x 10 per pixel of the content
+  mask(cv::Rect(0, 0, 5, 10)) = 0;
+  mask(cv::Rect(20, 10, 4, 10)) = 0;
+  const BinaryContent excluded = excluded_pixels(mask);
+  EXPECT_EQ(excluded.rows[0], 1U);
+  EXPECT_EQ(count(excluded), 1);
+}
+
 TEST(Binarize, ScaleOfTheMapDoesNotMatter) {
   const cv::Mat1f map = saliency_map(textured_image({200, 150}, 6));
   const cv::Mat scaled = map * 1024.0;

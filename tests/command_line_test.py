@@ -118,6 +118,49 @@ class CommandLineTest(CommandTest):
         self.assert_fails(ran, 3, f"'{camera}' is for images of 640 x 240 px", "320 x 240")
         self.assertFalse(self.out.exists())
 
+    # Masks.
+
+    def mask(self, width=320, height=240, dark_rows=0, maximum=255):
+        """A mask whose lowest rows are black."""
+        bright = maximum.to_bytes(1 if maximum < 256 else 2, "big")
+        file = self.scratch / f"mask_{width}_{dark_rows}_{maximum}.pgm"
+        file.write_bytes(b"P5 %d %d %d " % (width, height, maximum) +
+                         bright * (width * (height - dark_rows)) +
+                         bytes(len(bright)) * (width * dark_rows))
+        return file
+
+    def test_a_mask_leaves_out_a_part_of_all_images(self):
+        run = ["run", self.images, "--out", self.out, "--no-report", "--overwrite"]
+        self.assertEqual(loopbit(*run, "--mask", self.mask()).returncode, 0)
+        self.assertEqual(decisions(self.out), decisions(self.reference))
+        self.assertEqual(loopbit(*run, "--mask", self.mask(dark_rows=80)).returncode, 0)
+        self.assertNotEqual(decisions(self.out), decisions(self.reference))
+
+    def test_a_mask_that_does_not_fit_is_refused(self):
+        images = self.few_images()
+        for mask, parts in ((self.mask(width=640), ("640 x 240 px, but the images have 320 x 240",)),
+                            (self.mask(maximum=65535), ("16 bits per pixel",)),
+                            (self.mask(dark_rows=240), ("0 everywhere",)),
+                            (self.scratch / "no.png", ("no.png", "cannot be found"))):
+            ran = loopbit("run", images, "--out", self.out, "--mask", mask)
+            self.assert_fails(ran, 2 if parts == ("0 everywhere",) else 3, *parts)
+        self.assertFalse(self.out.exists())
+
+    def test_a_query_takes_the_mask_of_its_map(self):
+        town = self.scratch / "town.db"
+        mask = self.mask(dark_rows=80)
+        run = ["run", self.images, "--map", town, "--mask", mask, "--no-report", "--limit", 10]
+        self.assertEqual(loopbit(*run).returncode, 0)
+        image = sorted(self.images.iterdir())[4]
+        ran = loopbit("query", town, image, "--json", "--mask", mask)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        place = json.loads(ran.stdout)["places"][0]
+        self.assertEqual((place["frame"], place["similarity"]), (4, 1.0))
+        ran = loopbit("query", town, image, "--json")
+        self.assertLess(json.loads(ran.stdout)["places"][0]["similarity"], 1.0)
+        ran = loopbit("query", town, image, "--mask", self.mask(width=640))
+        self.assertIn("the mask has 640 x 240", ran.stderr)
+
     def test_a_camera_that_cannot_be_read_is_refused(self):
         missing = self.scratch / "missing.yaml"
         malformed = self.scratch / "malformed.yaml"

@@ -287,6 +287,76 @@ TEST(LoopDetector, AFirstLookFindsAsManyLoopsInRealImages) {
   EXPECT_GE(loops, thorough_loops - 1);
 }
 
+// Masks
+
+/// Of a real image with a bonnet over its lowest 72 rows, the pixels that are not the bonnet.
+cv::Mat1b bonnet_mask() {
+  cv::Mat1b mask(384, 512, 255);
+  mask.rowRange(312, 384) = 0;
+  return mask;
+}
+
+/// The same bonnet in all images, under light that changes.
+cv::Mat1b with_bonnet(const cv::Mat1b& image, int frame) {
+  cv::Mat1b picture = image.clone();
+  cv::Mat1b bonnet;
+  textured_image({512, 72}, 1000).convertTo(bonnet, CV_8U, frame % 2 == 0 ? 1.0 : 0.7);
+  bonnet.copyTo(picture.rowRange(312, 384));
+  return picture;
+}
+
+TEST(LoopDetector, NothingIsFoundUnderAMask) {
+  LOOPBIT_NEEDS_DATA("corridor_loop");
+  LoopDetector masked;
+  masked.set_mask(bonnet_mask());
+  int loops = 0;
+  std::size_t num_features = 0;
+  for (int frame = 0; frame < 84; ++frame) {
+    const cv::Mat1b image = real_image("corridor_loop/images", static_cast<std::size_t>(frame));
+    Evidence evidence;
+    const Detection detection = masked.process(with_bonnet(image, frame), std::nullopt, &evidence);
+    for (std::size_t row = 52; row < 64; ++row) EXPECT_EQ(evidence.content.rows[row], 0U);
+    const Features features = masked.features_of({0, frame});
+    num_features += features.keypoints.size();
+    const float top_px = 312.0F * static_cast<float>(features.working_size_px.height) / 384.0F;
+    for (const Keypoint& keypoint : features.keypoints) EXPECT_LT(keypoint.y_px, top_px);
+    const bool is_loop = detection.status == Status::loop;
+    loops += is_loop ? 1 : 0;
+    EXPECT_TRUE(!is_loop || frame >= 40) << "a wrong loop of frame " << frame;
+  }
+  EXPECT_GT(loops, 25);
+  EXPECT_GT(num_features, std::size_t{84} * 100);
+}
+
+TEST(LoopDetector, AMaskThatExcludesNothingChangesNothing) {
+  const std::vector<cv::Mat1b> images = two_laps();
+  LoopDetector plain(fast_options());
+  LoopDetector masked(fast_options());
+  masked.set_mask(cv::Mat1b(images[0].size(), 1));
+  const auto expected = process_all(plain, images);
+  const auto found = process_all(masked, images);
+  for (std::size_t i = 0; i < images.size(); ++i) expect_same_answer(found[i], expected[i]);
+  LoopDetector unmasked(fast_options());
+  unmasked.set_mask(cv::Mat1b::eye(images[0].size()));
+  unmasked.set_mask(cv::Mat());
+  const auto without = process_all(unmasked, images);
+  for (std::size_t i = 0; i < images.size(); ++i) expect_same_answer(without[i], expected[i]);
+}
+
+TEST(LoopDetector, AMaskThatDoesNotFitIsRefused) {
+  LoopDetector detector(fast_options());
+  expect_error(ErrorKind::option, {"0 everywhere"},
+               [&] { detector.set_mask(cv::Mat1b::zeros(240, 320)); });
+  expect_error(ErrorKind::option, {"CV_16UC1", "8 bits"},
+               [&] { detector.set_mask(cv::Mat1w::ones(240, 320)); });
+  detector.set_mask(cv::Mat1b(120, 160, 255));
+  expect_error(ErrorKind::input, {"320 x 240", "mask has 160 x 120"},
+               [&] { detector.process(view(0)); });
+  EXPECT_EQ(detector.size(), 0);
+  detector.set_mask(cv::Mat1b(240, 320, 255));
+  EXPECT_EQ(detector.process(view(0)).frame, 0);
+}
+
 // Places that look alike
 
 /// A picture of `scene` with the left half of `common`.

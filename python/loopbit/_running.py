@@ -126,6 +126,7 @@ def run_folder(
     not_false: Path | None = None,
     ignore: Path | None = None,
     positions_m: numpy.typing.ArrayLike | Path | None = None,
+    mask: Path | None = None,
     camera: Path | None = None,
     depth: Path | None = None,
     depth_scale: float = 5000.0,
@@ -151,6 +152,7 @@ def run_folder(
     evaluate().
     positions_m: camera centres, one per frame read, nan if unknown; or a file of poses. A truth
     file of poses also provides them.
+    mask: an image file of the size of the images, see LoopDetector.set_mask().
     camera: a calibration file, see read_cameras(), whose first camera is that of the images. The run
     then measures the relative pose of each loop and writes relative_poses.csv, relative_poses.g2o
     and matched_poses.tum.
@@ -184,6 +186,7 @@ def run_folder(
         truth=known,
         poses=file,
         positions_m=rows,
+        mask=mask or "",
         camera=camera or "",
         depth=depth or "",
         depth_scale=depth_scale,

@@ -299,6 +299,13 @@ Detection SharedDetector::query(ImageArgument image, std::optional<double> times
   return detection;
 }
 
+void SharedDetector::set_mask(const std::optional<ImageArgument>& mask) {
+  ImageArgument given = mask.value_or(ImageArgument());
+  const cv::Mat pixels = mask ? to_image(given, "mask") : cv::Mat();
+  const Answering guard(mutex_, is_answering_);
+  detector_.set_mask(pixels);
+}
+
 Detection SharedDetector::skip(std::optional<double> timestamp_s,
                                const std::optional<MatrixArgument>& odometry,
                                const std::optional<MatrixArgument>& odometry_covariance) {
@@ -379,6 +386,10 @@ void bind_detector(py::module_& module) {
            "is filled with all candidates, best first, and every candidate is verified, which "
            "takes longer. Only the first can be a loop. evidence and allowed are those of "
            "process().")
+      .def("set_mask", &SharedDetector::set_mask, py::arg("mask"),
+           "Excludes part of all images from now on, such as the robot's own body: where mask, "
+           "uint8 of shape (h, w), is 0, there is no content and no feature has its centre. Images "
+           "must have its size. None excludes nothing.")
       .def("skip", &SharedDetector::skip, py::arg("timestamp_s") = py::none(),
            py::arg("odometry") = py::none(), py::arg("odometry_covariance") = py::none(),
            "Counts a frame without a usable image, so that frame numbers stay aligned. For "

@@ -32,6 +32,7 @@ class SharedDetector {
   [[nodiscard]] Detection query(ImageArgument image, std::optional<double> timestamp_s,
                                 std::vector<RankedPlace>* ranking, Evidence* evidence,
                                 const AllowedArgument& allowed) const;
+  void set_mask(const std::optional<ImageArgument>& mask);
   Detection skip(std::optional<double> timestamp_s, const std::optional<MatrixArgument>& odometry,
                  const std::optional<MatrixArgument>& odometry_covariance);
   void remove(const PlaceArgument& place);

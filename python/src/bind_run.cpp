@@ -175,8 +175,9 @@ RunRequest request_of(const LoopDetectorOptions& options, const Path& folder, bo
                       bool evidence, const Path& map, bool keep_images,
                       std::optional<std::size_t> map_cache_mb, const ScoringRequest& scoring,
                       const std::optional<GroundTruth>& truth, const Path& poses,
-                      const std::optional<PositionRows>& positions_m, const Path& camera,
-                      const Path& depth, double depth_scale, const Path& odometry) {
+                       const std::optional<PositionRows>& positions_m, const Path& mask,
+                       const Path& camera, const Path& depth, double depth_scale,
+                       const Path& odometry) {
   const std::string camera_file = camera.string();
   return {.options = options,
           .folder = folder.string(),
@@ -189,6 +190,7 @@ RunRequest request_of(const LoopDetectorOptions& options, const Path& folder, bo
           .truth = truth,
           .poses = poses.string(),
           .positions_m = positions_m ? std::optional(to_positions(*positions_m)) : std::nullopt,
+          .mask = mask.string(),
           .camera = camera_file.empty() ? std::nullopt : std::optional(read_camera(camera_file)),
           .camera_file = camera_file,
           .depth = depth.string(),
@@ -201,8 +203,8 @@ void bind_run_folder(py::module_& module) {
       .def(py::init(&request_of), py::kw_only(), py::arg("options"), py::arg("folder"),
            py::arg("overwrite"), py::arg("evidence"), py::arg("map"), py::arg("keep_images"),
            whole("map_cache_mb"), py::arg("scoring"), py::arg("truth"), py::arg("poses"),
-           py::arg("positions_m"), py::arg("camera"), py::arg("depth"), py::arg("depth_scale"),
-           py::arg("odometry"));
+           py::arg("positions_m"), py::arg("mask"), py::arg("camera"), py::arg("depth"),
+           py::arg("depth_scale"), py::arg("odometry"));
   module.def("_run_folder", &run_folder, py::arg("source"), py::arg("request"),
              py::arg("on_bad_frame"));
 }

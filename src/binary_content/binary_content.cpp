@@ -111,6 +111,21 @@ int overlap(const BinaryContent& a, const BinaryContent& b) {
   return set;
 }
 
+template <typename Visit>
+void for_each_pixel(const Visit& visit) {
+  for (int y = 0; y < kContentSide; ++y) {
+    for (int x = 0; x < kContentSide; ++x) visit(x, y);
+  }
+}
+
+bool is_set(const BinaryContent& content, int x, int y) {
+  return (content.rows[static_cast<std::size_t>(y)] >> static_cast<unsigned>(x) & 1U) != 0;
+}
+
+void set_pixel(BinaryContent& content, int x, int y) {
+  content.rows[static_cast<std::size_t>(y)] |= std::uint64_t{1} << static_cast<unsigned>(x);
+}
+
 }  // namespace
 
 int count(const BinaryContent& content) {
@@ -185,20 +200,30 @@ cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& option
   return separable_filter(map, gaussian_kernel(options.blur_sigma_px), cv::BORDER_REFLECT_101);
 }
 
-BinaryContent binarize(const cv::Mat1f& saliency, double gamma) {
+BinaryContent binarize(const cv::Mat1f& saliency, double gamma, const BinaryContent& excluded) {
   CV_Assert(saliency.rows == kContentSide && saliency.cols == kContentSide);
   double sum = 0;
-  for (const float value : saliency) sum += value;
-  const double threshold = gamma * sum / static_cast<double>(saliency.total());
+  for_each_pixel([&](int x, int y) {
+    if (!is_set(excluded, x, y)) sum += saliency(y, x);
+  });
+  const double threshold = gamma * sum / (kContentSide * kContentSide - count(excluded));
   BinaryContent content;
-  for (int y = 0; y < kContentSide; ++y) {
-    for (int x = 0; x < kContentSide; ++x) {
-      if (saliency(y, x) > threshold) {
-        content.rows[static_cast<std::size_t>(y)] |= std::uint64_t{1} << x;
-      }
-    }
-  }
+  for_each_pixel([&](int x, int y) {
+    if (saliency(y, x) > threshold && !is_set(excluded, x, y)) set_pixel(content, x, y);
+  });
   return content;
+}
+
+BinaryContent excluded_pixels(const cv::Mat1b& mask) {
+  check_size(mask);
+  cv::Mat1b is_used;  // 0 or 255
+  cv::compare(mask, 0, is_used, cv::CMP_NE);
+  const cv::Mat1f used = resize_to_map(is_used);
+  BinaryContent excluded;
+  for_each_pixel([&](int x, int y) {
+    if (used(y, x) <= 128) set_pixel(excluded, x, y);  // half of 255, rounded
+  });
+  return excluded;
 }
 
 BinaryContent binary_content(const cv::Mat1b& gray, const BinaryContentOptions& options) {

@@ -16,6 +16,7 @@
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
 #include "loopbit/printable.hpp"
+#include "loopbit/record_run.hpp"
 #include "loopbit/recordings.hpp"
 
 #include "commands.hpp"
@@ -34,6 +35,7 @@ struct QueryFlags {
   std::string map;
   std::vector<std::string> images;
   std::string topic;
+  std::string mask;
   std::string watch;
   std::size_t places = 3;
   std::string place_images;
@@ -111,6 +113,7 @@ class Relocalizer {
       : flags_(flags),
         map_(std::make_shared<MapReader>(flags.map, flags.map_cache_mb)),
         detector_(detector_options(*map_, flags), map_) {
+    if (!flags.mask.empty()) detector_.set_mask(read_mask(flags.mask));
     if (!flags.place_images.empty()) place_images_.emplace(*map_, flags.place_images);
     if (!flags.json) {
       fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7}  {:>10}  {:>7}\n", "image", "status",
@@ -214,6 +217,7 @@ void add_query(CLI::App& app, int& exit_code) {
   add_map_cache_flag(*command, flags->map_cache_mb);
   add_image_flag(*command, flags->max_megapixels);
   add_topic_flag(*command, flags->topic);
+  add_mask_flag(*command, flags->mask);
   command->add_flag("--json", flags->json, "Print one JSON object per image, one per line");
   command
       ->add_option("--set", flags->settings,

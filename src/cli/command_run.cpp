@@ -108,6 +108,7 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
       ->check(whole_number(0, 2'000'000'000));
   add_image_flag(*command, flags->max_megapixels);
   add_topic_flag(*command, flags->topic);
+  add_mask_flag(*command, flags->session.run.mask);
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
   CLI::Option* camera =

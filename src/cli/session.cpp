@@ -176,6 +176,14 @@ void add_report_flag(CLI::App& command, ReportOptions& options) {
       ->check(number(0.0, 2000.0));
 }
 
+void add_mask_flag(CLI::App& command, std::string& mask) {
+  command
+      .add_option("--mask", mask,
+                  "An image of the size of the images, 8 bits: where it is 0 (black), the images "
+                  "are ignored, such as for the robot's own body")
+      ->type_name("FILE");
+}
+
 void add_image_flag(CLI::App& command, int& max_megapixels) {
   command.add_option("--max-megapixels", max_megapixels, "Larger images are unreadable")
       ->type_name("N")

@@ -45,6 +45,9 @@ void add_report_flag(CLI::App& command, ReportOptions& options);
 /// Adds the flag for what of a map stays in memory.
 void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb);
 
+/// Adds the flag for LoopDetector::set_mask() to `command`.
+void add_mask_flag(CLI::App& command, std::string& mask);
+
 /// Adds the flag for open_source()'s largest images to `command`.
 void add_image_flag(CLI::App& command, int& max_megapixels);
 

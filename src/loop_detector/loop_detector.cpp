@@ -162,11 +162,11 @@ class LoopDetector::Impl {
     // Step 1: what the image is recognised by.
     const cv::Mat1b gray = gray_image(image);
     seen.saliency = saliency_map(gray, options_.binary_content);
-    seen.content = binarize(seen.saliency, options_.binary_content.gamma);
+    seen.content = binarize(seen.saliency, options_.binary_content.gamma, excluded_);
     detection.times.content_ms = stopwatch.lap_ms();
 
     // Step 3 begins: features. They also tell how far back the present view reaches.
-    seen.work->surf.extract(gray, seen.features);
+    seen.work->surf.extract(gray, seen.features, mask_);
     remove_attached_parts(seen);
     detection.times.features_ms = stopwatch.lap_ms();
     recognise(seen, allowed, detection);
@@ -287,6 +287,25 @@ class LoopDetector::Impl {
                         .odometry = given.odometry};
     add_place(BinaryContent{}, Features{}, detection, cv::Mat());
     return detection;
+  }
+
+  /// See LoopDetector::set_mask.
+  void set_mask(const cv::Mat& mask) {
+    if (mask.empty()) {
+      mask_ = cv::Mat1b();
+      excluded_ = {};
+      return;
+    }
+    if (mask.type() != CV_8UC1 || cv::countNonZero(mask) == 0) {
+      throw Error(ErrorKind::option,
+                  mask.type() != CV_8UC1
+                      ? fmt::format("The mask is of OpenCV type {}; give one of 8 bits, grey.",
+                                    cv::typeToString(mask.type()))
+                      : "The mask is 0 everywhere, which excludes the whole image; pixels that "
+                        "count are not 0.");
+    }
+    excluded_ = excluded_pixels(mask);
+    mask_ = mask.clone();
   }
 
   /// See LoopDetector::remove.
@@ -606,6 +625,8 @@ class LoopDetector::Impl {
 
   LoopDetectorOptions options_;
   OdometryTrack odometry_;  ///< of this session
+  cv::Mat1b mask_;          ///< of all images; empty = none
+  BinaryContent excluded_;  ///< by the mask
   PlaceIndex index_;
   PlaceMemory memory_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
@@ -666,6 +687,8 @@ Detection LoopDetector::skip(std::optional<double> timestamp_s,
                              const std::optional<OdometryPose>& odometry) {
   return impl_->skip({timestamp_s, odometry});
 }
+
+void LoopDetector::set_mask(const cv::Mat& mask) { impl_->set_mask(mask); }
 
 void LoopDetector::remove(const SessionFrame& place) { impl_->remove(place); }
 

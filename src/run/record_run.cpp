@@ -12,6 +12,8 @@
 #include <fmt/format.h>
 
 #include "loopbit/finished_run.hpp"
+#include "loopbit/gray_image.hpp"
+#include "loopbit/image_file.hpp"
 #include "loopbit/picture_jpeg.hpp"
 
 #include "depth_folder.hpp"
@@ -114,6 +116,25 @@ std::optional<CameraModel> camera_of(RunInput& input, const RunRequest& request)
   return camera;
 }
 
+/// Throws Error (kind input) if the mask cannot be read or does not fit the first usable image.
+cv::Mat1b mask_of(RunInput& input, const RunRequest& request) {
+  if (request.mask.empty()) return {};
+  cv::Mat1b mask = read_mask(request.mask);
+  const cv::Size size_px = input.prove().image.size();
+  if (mask.size() == size_px) return mask;
+  throw Error(ErrorKind::input,
+              fmt::format("The mask '{}' has {} x {} px, but the images have {} x {}; give a mask "
+                          "of the same size.",
+                          request.mask, mask.cols, mask.rows, size_px.width, size_px.height));
+}
+
+LoopDetector make_detector(const RunRequest& request, std::shared_ptr<MapStorage> map,
+                           const cv::Mat1b& mask) {
+  LoopDetector detector(request.options, std::move(map));
+  detector.set_mask(mask);
+  return detector;
+}
+
 /// Throws Error if there is no camera to go with the depth images, or they do not fit it.
 std::optional<DepthFolder> depth_of(const RunRequest& request,
                                     const std::optional<CameraModel>& camera) {
@@ -166,7 +187,7 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
   std::vector<std::string> inputs = request.other_inputs;
   const ScoringRequest& scoring = request.scoring;
   inputs.insert(inputs.end(), {input.input(), scoring.truth, scoring.not_false, scoring.ignore,
-                               request.poses, request.camera_file, request.odometry});
+                               request.poses, request.mask, request.camera_file, request.odometry});
   if (!request.folder.empty()) return {request.folder, request.overwrite, inputs};
   const auto stem = std::filesystem::path(request.map).replace_extension().string();
   const std::string folder = fmt::format("{}_session_{}", stem, map_session);
@@ -177,8 +198,8 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
 class RecordedRun {
  public:
   RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected,
-              const std::optional<CameraModel>& camera, std::optional<DepthFolder> depth,
-              std::optional<OdometryFile> odometry)
+              const cv::Mat1b& mask, const std::optional<CameraModel>& camera,
+              std::optional<DepthFolder> depth, std::optional<OdometryFile> odometry)
       : input_(input),
         request_(request),
         camera_(camera),
@@ -186,7 +207,7 @@ class RecordedRun {
         odometry_(std::move(odometry)),
         frames_(std::move(expected)),
         map_(open_map(input, request)),
-        detector_(std::in_place, request.options, map_),
+        detector_(make_detector(request, map_, mask)),
         record_(record_of(input, request)),
         folder_(make_folder(input, request, map_ ? map_->session() : 0)) {
     if (map_) record_.map_session = map_->session();
@@ -299,6 +320,15 @@ class RecordedRun {
 
 }  // namespace
 
+cv::Mat1b read_mask(const std::string& file) {
+  const cv::Mat image = images::read_image_file(file, kMaxMegapixels);
+  if (image.depth() != CV_8U) {
+    throw Error(ErrorKind::input,
+                fmt::format("The mask '{}' has 16 bits per pixel; convert it to 8 bits.", file));
+  }
+  return gray_image(image);
+}
+
 RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
                       const std::atomic<bool>& stop) {
   const FramesRead expected = expected_frames(input);
@@ -306,8 +336,9 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
   if (request.overwrite || request.options.exclusion.seconds > 0) {
     check_time(input.prove(), request.options);
   }
+  const cv::Mat1b mask = mask_of(input, request);
   const std::optional<CameraModel> camera = camera_of(input, request);
-  RecordedRun run(input, request, expected, camera, depth_of(request, camera),
+  RecordedRun run(input, request, expected, mask, camera, depth_of(request, camera),
                   odometry_of(input, request, expected));
   try {
     run.detect(listener, stop);

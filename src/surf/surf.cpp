@@ -9,6 +9,9 @@
 #include <tuple>
 #include <vector>
 
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
 #include "loopbit/gray_image.hpp"
 #include "loopbit/image_shrinker.hpp"
 #include "loopbit/kernels_for.hpp"
@@ -57,6 +60,14 @@ bool stronger(const Maximum& a, const Maximum& b) {
          std::tuple(-b.response, b.octave, b.y, b.x, b.interval);
 }
 
+void check_mask(const cv::Mat1b& mask, cv::Size size_px) {
+  if (mask.empty() || mask.size() == size_px) return;
+  throw Error(ErrorKind::input,
+              fmt::format("The image has {} x {} pixels, but the mask has {} x {}; give a mask of "
+                          "the same size.",
+                          size_px.width, size_px.height, mask.cols, mask.rows));
+}
+
 }  // namespace
 
 class SurfExtractor::Impl {
@@ -68,14 +79,21 @@ class SurfExtractor::Impl {
     validate(options, "surf");
   }
 
-  void extract(const cv::Mat1b& gray, Features& features) {
+  void extract(const cv::Mat1b& gray, Features& features, const cv::Mat1b& mask) {
     check_size(gray);
+    check_mask(mask, gray.size());
     integral_.load(smoothed(working_image(gray)), kernels_);
     pyramid_.build(integral_, kernels_);
     maxima_.clear();
     pyramid_.find_maxima(kMinResponse, kernels_, maxima_);
+    if (!mask.empty()) {
+      std::erase_if(maxima_, [&](const Maximum& m) {
+        const int step = HessianPyramid::step_px(m.octave);
+        return is_masked(mask, m.x * step, m.y * step);
+      });
+    }
     spread();
-    locate();
+    locate(mask);
     describe(features);
   }
 
@@ -185,12 +203,21 @@ class SurfExtractor::Impl {
            at.y_px + reach <= size.height - 1;
   }
 
+  /// Whether `mask` excludes a point of the working image.
+  [[nodiscard]] bool is_masked(const cv::Mat1b& mask, double x_px, double y_px) const {
+    const cv::Size size = integral_.size_px();
+    const int x = static_cast<int>((x_px + 0.5) * mask.cols / size.width);
+    const int y = static_cast<int>((y_px + 0.5) * mask.rows / size.height);
+    return mask(std::clamp(y, 0, mask.rows - 1), std::clamp(x, 0, mask.cols - 1)) == 0;
+  }
+
   /// The strongest blobs whose patches lie within the image, dark ones first.
-  void locate() {
+  void locate(const cv::Mat1b& mask) {
     blobs_.clear();
     for (const Maximum& m : maxima_) {
       const auto at = pyramid_.refined(m);
       if (!at || !fits(*at)) continue;
+      if (!mask.empty() && is_masked(mask, at->x_px, at->y_px)) continue;
       blobs_.push_back({m,
                         {static_cast<float>(at->x_px), static_cast<float>(at->y_px),
                          static_cast<float>(at->scale), 0.0F},
@@ -254,8 +281,8 @@ SurfExtractor::~SurfExtractor() = default;
 SurfExtractor::SurfExtractor(SurfExtractor&&) noexcept = default;
 SurfExtractor& SurfExtractor::operator=(SurfExtractor&&) noexcept = default;
 
-void SurfExtractor::extract(const cv::Mat1b& gray, Features& features) {
-  impl_->extract(gray, features);
+void SurfExtractor::extract(const cv::Mat1b& gray, Features& features, const cv::Mat1b& mask) {
+  impl_->extract(gray, features, mask);
 }
 
 Features extract_surf(const cv::Mat1b& gray, const SurfOptions& options) {

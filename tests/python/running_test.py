@@ -30,6 +30,26 @@ def test_run_folder_is_that_of_the_command(command, dataset, run, tmp_path):
         {**as_row(d), "timestamp": ""} for d in run.detections]
 
 
+def test_a_mask_is_that_of_the_command(command, dataset, images, tmp_path):
+    black = np.full((240, 320), 255, np.uint8)
+    black[160:] = 0
+    mask = tmp_path / "mask.pgm"
+    mask.write_bytes(b"P5 320 240 255 " + black.tobytes())
+    command("run", dataset / "images", "--out", tmp_path / "cpp", "--mask", mask, "--no-report")
+    run = loopbit.run_folder(dataset / "images", tmp_path / "python", mask=mask)
+    assert decisions(tmp_path / "python") == decisions(tmp_path / "cpp")
+    assert not any(content.bits()[43:].any() for content in run.contents().values())
+    detector = loopbit.LoopDetector()
+    detector.set_mask(black)
+    assert [as_row(detector.process(image)) for image in images] == decisions(tmp_path / "cpp")
+    with pytest.raises(loopbit.InputError, match="mask has 320 x 240"):
+        detector.process(images[0][:100])
+    with pytest.raises(loopbit.OptionError, match="0 everywhere"):
+        detector.set_mask(np.zeros((240, 320), np.uint8))
+    detector.set_mask(None)
+    assert detector.process(images[0][:100]).frame == len(images)
+
+
 def test_finished_run(run):
     assert run.positions_m.shape == (120, 3) and run.truth.same_place.size > 0
     array = loopbit.detections_array(run.detections)

@@ -82,8 +82,13 @@ struct BinaryContentOptions {
 cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options = {});
 
 /// Sets the pixels whose saliency exceeds gamma times the mean. An image without contrast has none.
-/// Wang et al. 2019, section III-A.
-BinaryContent binarize(const cv::Mat1f& saliency, double gamma);
+/// Wang et al. 2019, section III-A. Pixels of `excluded` are not set, and do not count for the
+/// mean.
+BinaryContent binarize(const cv::Mat1f& saliency, double gamma, const BinaryContent& excluded = {});
+
+/// The pixels of a content of which at least half is excluded by the mask of an image: where
+/// `mask`, at least 32 x 32, is 0.
+[[nodiscard]] BinaryContent excluded_pixels(const cv::Mat1b& mask);
 
 /// binarize(saliency_map(gray)): step 1 of the method.
 BinaryContent binary_content(const cv::Mat1b& gray, const BinaryContentOptions& options = {});

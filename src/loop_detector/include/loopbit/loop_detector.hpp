@@ -95,6 +95,13 @@ class LoopDetector {
   Detection skip(std::optional<double> timestamp_s = std::nullopt,
                  const std::optional<OdometryPose>& odometry = std::nullopt);
 
+  /// Excludes part of all images from now on, such as the robot's own body or the rim of the lens:
+  /// where `mask`, 8 bits and grey, is 0, there is no content and no feature has its centre. An
+  /// image of another size is then an Error (kind input). The map does not store the mask. An empty
+  /// one excludes nothing. Throws Error (kind option) if `mask` is of another type or excludes the
+  /// whole image, or Error (kind input) if it has less than 32 x 32 pixels. Copies it.
+  void set_mask(const cv::Mat& mask);
+
   /// Removes a place, such as a culled key frame, also from the map. From now on it is no candidate
   /// and affects no answer. Frames keep their numbers. Removing it again changes nothing. Throws
   /// Error (kind option) if there is no such place, and whatever MapStorage::remove throws. Frees

@@ -42,6 +42,8 @@ struct RunRequest {
   std::string truth_description = {};  ///< of `truth`, for people
   std::string poses = {};              ///< a file; empty = the file of truth, if that has poses
   std::optional<Positions> positions_m = std::nullopt;  ///< one per frame, in place of `poses`
+  /// An image file that excludes part of all images, see read_mask(); empty = none.
+  std::string mask = {};
   /// The camera of the images, to measure the relative pose of each loop.
   std::optional<CameraModel> camera = std::nullopt;
   std::string camera_file = {};  ///< where it is from, for messages and run.json
@@ -54,6 +56,10 @@ struct RunRequest {
   std::string odometry = {};
   std::vector<std::string> other_inputs = {};  ///< more files that are never replaced
 };
+
+/// A mask for LoopDetector::set_mask() from an image file of 8 bits; colours become grey. Throws
+/// Error (kind input) if it cannot be read, has 16 bits or fewer than 32 x 32 pixels.
+cv::Mat1b read_mask(const std::string& file);
 
 /// What came of a run.
 struct RunOutcome {
@@ -77,9 +83,9 @@ struct RunOutcome {
 /// listener throws, run.json says why, the map has the places so far, and the exception goes on.
 ///
 /// Throws Error: kind option for a request that contradicts itself or the input, or without a
-/// folder and a map; kind input for files of truth, poses and odometry, for a camera or depth that
-/// does not fit the images, and if the input has ended without a readable frame; kind output if
-/// something cannot be saved; and what MapWriter and run() throw.
+/// folder and a map; kind input for files of truth, poses and odometry, for a mask, camera or depth
+/// that does not fit the images, and if the input has ended without a readable frame; kind output
+/// if something cannot be saved; and what MapWriter and run() throw.
 RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
                       const std::atomic<bool>& stop);
 

@@ -66,8 +66,10 @@ class SurfExtractor {
   SurfExtractor(SurfExtractor&&) noexcept;
   SurfExtractor& operator=(SurfExtractor&&) noexcept;
 
-  /// See extract_surf. Replaces `features`.
-  void extract(const cv::Mat1b& gray, Features& features);
+  /// See extract_surf. Replaces `features`. With a mask, there are none whose centre lies on a
+  /// pixel of value 0. Throws Error (kind input) if `mask` has another size than `gray`; empty = no
+  /// mask.
+  void extract(const cv::Mat1b& gray, Features& features, const cv::Mat1b& mask = {});
 
  private:
   class Impl;
