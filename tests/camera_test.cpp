@@ -330,6 +330,12 @@ TEST_F(CameraFile, IsFoundInADataSet) {
   EXPECT_EQ(find_camera((folder_ / "kitti").string()), (FoundCamera{kitti_file, 2}));
   std::filesystem::create_directories(folder_ / "kitti" / "image_0");
   EXPECT_EQ(find_camera((folder_ / "kitti").string()), (FoundCamera{kitti_file, 0}));
+  EXPECT_EQ(find_camera((folder_ / "kitti/image_1").string()), (FoundCamera{kitti_file, 1}));
+  EXPECT_EQ(find_camera((folder_ / "kitti/image_3/").string()), (FoundCamera{kitti_file, 3}));
+  EXPECT_FALSE(find_camera((folder_ / "kitti/image_4").string()));
+  const std::string right_file = write("euroc/mav0/cam1/sensor.yaml", "");
+  EXPECT_EQ(find_camera((folder_ / "euroc/mav0/cam1/data").string()), (FoundCamera{right_file, 0}));
+  EXPECT_FALSE(find_camera((folder_ / "euroc/mav0/cam1/images").string()));
 }
 
 }  // namespace

@@ -18,6 +18,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "loopbit/camera_file.hpp"
+#include "loopbit/read_file.hpp"
 #include "loopbit/record_run.hpp"
 #include "loopbit/text_rows.hpp"
 #include "loopbit/world.hpp"
@@ -198,6 +199,13 @@ void expect_graph(const std::string& folder) {
   EXPECT_EQ(edges, known.size());
 }
 
+/// The median.
+double middle_of(std::vector<double> values) {
+  const auto middle = values.begin() + std::ssize(values) / 2;
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 double time_s(double frame) { return 1000 + frame / 2; }
 
 /// The images of a source, at the times of time_s().
@@ -263,13 +271,99 @@ TEST_F(DepthFolderTest, ARunWithDepthMeasuresMetres) {
   RunInput input(std::make_unique<TimedImages>(open_source(path("town/images"))),
                  path("town/images"));
   record_run(input, request, {[](const Detection&) {}, [](const std::string&) {}}, false);
-  std::vector<double> errors = length_errors(path("run/relative_poses.csv"), world);
+  const std::vector<double> errors = length_errors(path("run/relative_poses.csv"), world);
   ASSERT_GT(errors.size(), 20U);
-  const auto middle = errors.begin() + std::ssize(errors) / 2;
-  std::nth_element(errors.begin(), middle, errors.end());
-  EXPECT_LT(*middle, 0.05);
+  EXPECT_LT(middle_of(errors), 0.05);
   expect_graph(path("run"));
   expect_matched(path("run"));
+}
+
+class RightImagesTest : public DepthFolderTest {
+ protected:
+  static constexpr double kBaseline_m = 0.5;
+
+  /// A drive past the same houses twice, with the images of a right camera in "right".
+  [[nodiscard]] World drive() const {
+    WorldOptions options;
+    options.frames = 150;
+    options.laps = 2;
+    options.spacing_m = 1.5;
+    World world(options);
+    write_dataset(world, path("town"));
+    std::filesystem::create_directory(path("right"));
+    for (int frame = 0; frame < options.frames; ++frame) {
+      if (frame % 10 == 3) continue;  // some are missing
+      cv::imwrite(path(fmt::format("right/{:06}.jpg", frame)), world.render(frame, kBaseline_m));
+    }
+    write("right/000014.jpg", "damaged");
+    return world;
+  }
+
+  /// As Kalibr writes it.
+  [[nodiscard]] std::string camchain(const CameraModel& camera, bool has_pose) const {
+    const auto entry = [&](int number) {
+      return fmt::format(
+          "cam{}:\n  camera_model: pinhole\n  intrinsics: [{}, {}, {}, {}]\n"
+          "  distortion_model: none\n  resolution: [{}, {}]\n",
+          number, camera.fx, camera.fy, camera.cx, camera.cy, camera.size_px.width,
+          camera.size_px.height);
+    };
+    const std::string pose = fmt::format(
+        "  T_cn_cnm1: [[1, 0, 0, {}], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]\n", -kBaseline_m);
+    return write("camchain.yaml", entry(0) + entry(1) + (has_pose ? pose : ""));
+  }
+
+  /// The folder of a run with the right images.
+  [[nodiscard]] std::string run(const std::string& name, const std::string& camera_file,
+                                double baseline_m) const {
+    const RunRequest request{.folder = path(name),
+                             .evidence = false,
+                             .camera = read_camera(camera_file),
+                             .camera_file = camera_file,
+                             .right = path("right"),
+                             .baseline_m = baseline_m};
+    RunInput input(open_source(path("town/images")), path("town/images"));
+    record_run(input, request, {[](const Detection&) {}, [](const std::string&) {}}, false);
+    return path(name);
+  }
+};
+
+TEST_F(RightImagesTest, ARunWithAStereoPairMeasuresMetres) {
+  const World world = drive();
+  const std::string camera_file = path("town/camera.yaml");
+  const std::string rectified = run("rectified", camera_file, kBaseline_m);
+  const std::vector<double> errors = length_errors(rectified + "/relative_poses.csv", world);
+  ASSERT_GT(errors.size(), 20U);
+  EXPECT_LT(middle_of(errors), 0.05);
+  int missing = 0;
+  for (const TextRow& row : read_rows(rectified + "/relative_poses.csv")) {
+    missing += std::string_view(row.text).find(",no_depth,") != std::string_view::npos ? 1 : 0;
+  }
+  EXPECT_GT(missing, 0);
+  const std::string chain = run("chain", camchain(read_camera(camera_file), true), 0);
+  EXPECT_EQ(read_file(chain + "/relative_poses.csv"), read_file(rectified + "/relative_poses.csv"));
+}
+
+TEST_F(RightImagesTest, ARightCameraThatIsNotKnownIsRefused) {
+  cv::imwrite(path("right.png"), cv::Mat1b(480, 640, 7));
+  for (const char* name : {"town/images/0.png", "right/0.png"}) {
+    std::filesystem::create_directories(std::filesystem::path(path(name)).parent_path());
+    std::filesystem::copy(path("right.png"), path(name));
+  }
+  const CameraModel camera{.size_px = {640, 480}, .fx = 380, .fy = 380, .cx = 319, .cy = 239};
+  const std::string single = write("camera.yaml", to_camera_info(camera));
+  test::expect_error(ErrorKind::input, {"right'", "camera.yaml' has one camera"},
+                     [&] { (void)run("run", single, 0); });
+  const std::string chain = camchain(camera, false);
+  test::expect_error(ErrorKind::input, {"right'", "no extrinsics"},
+                     [&] { (void)run("run", chain, 0); });
+  cv::imwrite(path("right/0.png"), cv::Mat1b(100, 100, 7));
+  test::expect_error(ErrorKind::input, {"right'", "640 x 480", "100 x 100"},
+                     [&] { (void)run("run", single, 0.1); });
+  std::filesystem::remove(path("right/0.png"));
+  test::expect_error(ErrorKind::input, {"right' has no images"},
+                     [&] { (void)run("run", single, 0.1); });
+  EXPECT_FALSE(std::filesystem::exists(path("run")));
 }
 
 TEST_F(DepthFolderTest, DepthNeedsACamera) {

@@ -131,6 +131,8 @@ def run_folder(
     depth: Path | None = None,
     depth_scale: float = 5000.0,
     odometry: Path | None = None,
+    right: Path | None = None,
+    baseline_m: float = 0.0,
     keep_images: bool = False,
     map_cache_mb: int | None = None,
     overwrite: bool = False,
@@ -161,6 +163,9 @@ def run_folder(
     metre.
     odometry: a file of poses of the camera by odometry: TUM, KITTI, EuRoC, or TUM with covariances.
     options.odometry says how fast it drifts.
+    right: a folder with the images of the right camera of a stereo pair, named like the images, in
+    place of depth. baseline_m is that of a rectified pair; without it, the calibration in a KITTI or
+    EuRoC folder counts, or the second camera of the calibration file.
     Files count all frames of the sequence, whatever part of it is read.
 
     Arguments are checked before the first frame as far as possible. If truth or positions turn out
@@ -191,6 +196,8 @@ def run_folder(
         depth=depth or "",
         depth_scale=depth_scale,
         odometry=odometry or "",
+        right=right or "",
+        baseline_m=baseline_m,
     ), on_bad_frame)
 
 

@@ -331,6 +331,19 @@ std::optional<FoundCamera> find_camera(const std::string& input) {
        {"mav0/cam0/sensor.yaml", "cam0/sensor.yaml", "sensor.yaml", "camera.yaml"}) {
     if (is_file(folder / name)) return FoundCamera{(folder / name).string(), 0};
   }
+  // The folder of one camera in a data set.
+  const fs::path within = folder.has_filename() ? folder : folder.parent_path();
+  const std::string name = within.filename().string();
+  const fs::path around = within.parent_path();
+  constexpr std::string_view kKitti = "image_";
+  const bool is_kitti = name.size() == kKitti.size() + 1 && name.starts_with(kKitti) &&
+                        name.back() >= '0' && name.back() <= '3';
+  if (is_kitti && is_file(around / "calib.txt")) {
+    return FoundCamera{(around / "calib.txt").string(), name.back() - '0'};
+  }
+  if (name == "data" && is_file(around / "sensor.yaml")) {
+    return FoundCamera{(around / "sensor.yaml").string(), 0};
+  }
   return std::nullopt;
 }
 

@@ -137,9 +137,24 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
                    "Poses of the camera by odometry (TUM, KITTI, EuRoC, or TUM with covariances), "
                    "matched by time or row. --set odometry.NAME=VALUE says how fast it drifts")
       ->type_name("FILE");
+  CLI::Option* right =
+      command
+          ->add_option("--right", flags->session.run.right,
+                       "Images of the right camera of a stereo pair, so that relative poses are in "
+                       "metres: a folder with names like those of the images. Its calibration: in "
+                       "its KITTI or EuRoC folder, or the second one of --camera")
+          ->type_name("DIR")
+          ->excludes(depth);
+  command
+      ->add_option("--baseline", flags->session.run.baseline_m,
+                   "Baseline of a rectified stereo pair in metres, in place of a calibration")
+      ->type_name("M")
+      ->check(number(1e-4, 1e4))
+      ->needs(right);
   command->add_flag("--no-poses", flags->no_poses, "Measure no relative poses")
       ->excludes(camera)
-      ->excludes(depth);
+      ->excludes(depth)
+      ->excludes(right);
   command->footer(list_truth_settings());
   command->callback(
       [flags, &arguments, &exit_code] { exit_code = run_command(*flags, arguments); });

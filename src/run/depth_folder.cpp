@@ -16,6 +16,8 @@
 #include "loopbit/relative_pose.hpp"
 #include "loopbit/text_rows.hpp"
 
+#include "image_names.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -33,18 +35,6 @@ std::map<double, fs::path> read_depth_list(const fs::path& list) {
   return files;
 }
 
-std::map<std::string, fs::path> images_by_stem(const std::string& folder) {
-  std::map<std::string, fs::path> files;
-  std::error_code error;
-  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
-    const fs::path& file = at->path();
-    if (images::is_image_name(file)) files[file.stem().string()] = file;
-  }
-  if (!error) return files;
-  throw Error(ErrorKind::input, fmt::format("The folder of depth images '{}' cannot be read ({}).",
-                                            folder, error.message()));
-}
-
 }  // namespace
 
 DepthFolder::DepthFolder(const std::string& folder, double units_per_m)
@@ -54,7 +44,7 @@ DepthFolder::DepthFolder(const std::string& folder, double units_per_m)
   if (fs::exists(list, error)) {
     by_time_s_ = read_depth_list(list);
   } else {
-    by_stem_ = images_by_stem(folder);
+    by_stem_ = images_by_stem(folder, "depth images");
   }
   if (!by_stem_.empty() || !by_time_s_.empty()) return;
   throw Error(ErrorKind::input,

@@ -54,10 +54,9 @@ std::string csv_row(PlaceId query, const std::string& match, const RelativePose&
 
 }  // namespace
 
-PoseFile::PoseFile(const std::string& folder, const CameraModel& camera,
-                   std::optional<DepthFolder> depth)
+PoseFile::PoseFile(const std::string& folder, const CameraModel& camera, LengthSources lengths)
     : camera_(camera),
-      depth_(std::move(depth)),
+      lengths_(std::move(lengths)),
       table_(folder, kPosesFile),
       graph_(folder, kPoseGraphFile),
       matched_(folder, kMatchedPosesFile) {
@@ -80,16 +79,30 @@ void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
   const Features match =
       detector.features_of(loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}));
   if (query.working_size_px != match.working_size_px) return;
-  const cv::Mat1f depth_m = depth_of(loop);
-  const RelativePose pose = estimator_.estimate({.query = {&query, &camera_},
-                                                 .match = {&match, &camera_},
-                                                 .match_depth_m = depth_ ? &depth_m : nullptr});
+  const RelativePose pose = measured(loop, query, match);
   table_.append(csv_row(loop.frame, match_cell(loop), pose));
   add_edge(loop, pose);
   if (pose.known != PoseKnown::metric) return;
   const Shot& shot = shots_.at(static_cast<std::size_t>(loop.frame));
   matched_.append(fmt::format("{:.6f} {}\n", shot.time_s.value_or(static_cast<double>(loop.frame)),
                               to_tum_pose(pose)));
+}
+
+/// With an empty depth image where there should be a depth or a right image, but is none.
+RelativePose PoseFile::measured(const LateLoop& loop, const Features& query,
+                                const Features& match) {
+  PoseRequest request{.query = {&query, &camera_}, .match = {&match, &camera_}};
+  const cv::Mat1f depth_m = depth_of(loop);
+  if (lengths_.depth || lengths_.right) request.match_depth_m = &depth_m;
+  Features right;
+  std::vector<NearbyView> beside;
+  if (lengths_.right && loop.match) {
+    const RightCamera& camera = lengths_.right->camera();
+    right = lengths_.right->features_of(shots_.at(static_cast<std::size_t>(*loop.match)).name);
+    if (!right.keypoints.empty()) beside = {{{&right, &camera.camera}, camera.T_left_right}};
+  }
+  request.beside = beside;
+  return estimator_.estimate(request);
 }
 
 /// An edge to another session is left out: its frames have numbers of their own. A vertex comes
@@ -106,9 +119,9 @@ void PoseFile::add_edge(const LateLoop& loop, const RelativePose& pose) {
 
 /// Empty for a match of an earlier session: a map stores no depth.
 cv::Mat1f PoseFile::depth_of(const LateLoop& loop) const {
-  if (!depth_ || !loop.match) return {};
+  if (!lengths_.depth || !loop.match) return {};
   const Shot& shot = shots_.at(static_cast<std::size_t>(*loop.match));
-  return depth_->depth_m(shot.name, shot.time_s, camera_.size_px);
+  return lengths_.depth->depth_m(shot.name, shot.time_s, camera_.size_px);
 }
 
 PoseFile::Lines::Lines(const std::string& folder, const char* name)

@@ -14,16 +14,22 @@
 #include "loopbit/relative_pose.hpp"
 
 #include "depth_folder.hpp"
+#include "right_images.hpp"
 
 namespace loopbit {
+
+/// What gives translations a length; the first that is there is used.
+struct LengthSources {
+  std::optional<DepthFolder> depth;
+  std::optional<RightImages> right;
+};
 
 /// Writes relative_poses.csv, one row per loop, and what is known of it as relative_poses.g2o and
 /// matched_poses.tum; see docs/run_folder.md.
 class PoseFile {
  public:
   /// `camera`: of all images, with their size. Throws Error (kind output).
-  /// `depth`: of the images, if there is any.
-  PoseFile(const std::string& folder, const CameraModel& camera, std::optional<DepthFolder> depth);
+  PoseFile(const std::string& folder, const CameraModel& camera, LengthSources lengths);
 
   /// Measures the poses of its loops, also late ones, and hands the lines to the system. `detector`
   /// has the features of both frames. Loops between images of different shapes are left out: they
@@ -32,6 +38,8 @@ class PoseFile {
 
  private:
   void add_loop(const LateLoop& loop, const LoopDetector& detector);
+  [[nodiscard]] RelativePose measured(const LateLoop& loop, const Features& query,
+                                      const Features& match);
   [[nodiscard]] cv::Mat1f depth_of(const LateLoop& loop) const;
   void add_edge(const LateLoop& loop, const RelativePose& pose);
 
@@ -45,14 +53,14 @@ class PoseFile {
     std::ofstream stream_;
   };
 
-  /// What a depth image is found by.
+  /// What a depth or right image is found by.
   struct Shot {
     std::string name;
     std::optional<double> time_s;
   };
 
   CameraModel camera_;
-  std::optional<DepthFolder> depth_;
+  LengthSources lengths_;
   std::vector<Shot> shots_;  ///< one per frame
   RelativePoseEstimator estimator_;
   Lines table_;

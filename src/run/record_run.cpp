@@ -135,19 +135,32 @@ LoopDetector make_detector(const RunRequest& request, std::shared_ptr<MapStorage
   return detector;
 }
 
-/// Throws Error if there is no camera to go with the depth images, or they do not fit it.
-std::optional<DepthFolder> depth_of(const RunRequest& request,
-                                    const std::optional<CameraModel>& camera) {
-  if (request.depth.empty()) return std::nullopt;
+/// Throws Error if they do not fit the camera, or there is none.
+LengthSources lengths_of(const RunRequest& request, const std::optional<CameraModel>& camera) {
+  LengthSources lengths;
+  const std::string& asked = request.depth.empty() ? request.right : request.depth;
+  if (asked.empty()) return lengths;
   if (!camera) {
     throw Error(ErrorKind::option,
-                fmt::format("The depth images of '{}' need the calibration of the camera; give "
-                            "camera, or leave depth out.",
-                            request.depth));
+                fmt::format("The {} images of '{}' need the calibration of the camera; give "
+                            "camera, or leave them out.",
+                            request.depth.empty() ? "right" : "depth", asked));
   }
-  DepthFolder depth(request.depth, request.depth_scale);
-  depth.check(camera->size_px);
-  return depth;
+  if (!request.depth.empty() && !request.right.empty()) {
+    throw Error(ErrorKind::option,
+                fmt::format("Both depth '{}' and right images '{}' are given; leave one out.",
+                            request.depth, request.right));
+  }
+  if (request.depth.empty()) {
+    lengths.right.emplace(
+        request.right,
+        right_camera(request.right, request.baseline_m, *camera, request.camera_file),
+        request.options.surf);
+    return lengths;
+  }
+  lengths.depth.emplace(request.depth, request.depth_scale);
+  lengths.depth->check(camera->size_px);
+  return lengths;
 }
 
 /// None without a file.
@@ -199,11 +212,11 @@ class RecordedRun {
  public:
   RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected,
               const cv::Mat1b& mask, const std::optional<CameraModel>& camera,
-              std::optional<DepthFolder> depth, std::optional<OdometryFile> odometry)
+              LengthSources lengths, std::optional<OdometryFile> odometry)
       : input_(input),
         request_(request),
         camera_(camera),
-        depth_(std::move(depth)),
+        lengths_(std::move(lengths)),
         odometry_(std::move(odometry)),
         frames_(std::move(expected)),
         map_(open_map(input, request)),
@@ -220,7 +233,7 @@ class RecordedRun {
     const std::shared_ptr<MapWriter> map = std::move(map_);
     LoopDetector detector = std::move(*detector_);
     std::optional<PoseFile> poses;
-    if (camera_) poses.emplace(folder_.path(), *camera_, std::move(depth_));
+    if (camera_) poses.emplace(folder_.path(), *camera_, std::move(lengths_));
     RunListener recording{.on_detection =
                               [&](const Detection& detection) {
                                 folder_.add(detection);
@@ -307,7 +320,7 @@ class RecordedRun {
   RunInput& input_;
   const RunRequest& request_;
   std::optional<CameraModel> camera_;
-  std::optional<DepthFolder> depth_;  ///< until detect()
+  LengthSources lengths_;  ///< until detect()
   std::optional<OdometryFile> odometry_;
   FramesRead frames_;               ///< expected, then read
   std::shared_ptr<MapWriter> map_;  ///< null without one, and after detect()
@@ -338,7 +351,7 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
   }
   const cv::Mat1b mask = mask_of(input, request);
   const std::optional<CameraModel> camera = camera_of(input, request);
-  RecordedRun run(input, request, expected, mask, camera, depth_of(request, camera),
+  RecordedRun run(input, request, expected, mask, camera, lengths_of(request, camera),
                   odometry_of(input, request, expected));
   try {
     run.detect(listener, stop);

@@ -26,7 +26,8 @@ CameraModel read_camera(const std::string& path, int index = 0);
 
 /// The calibration file that belongs to the images of `input`, by the layout of a data set: KITTI
 /// odometry (`calib.txt` beside `image_0`) or EuRoC (`sensor.yaml` beside the `data` of `cam0`), or
-/// a `camera.yaml` in the folder. Empty if there is none.
+/// a `camera.yaml` in the folder; `input` may also be the `image_1` or `cam1/data` of one camera.
+/// Empty if there is none.
 struct FoundCamera {
   std::string path;
   int index = 0;

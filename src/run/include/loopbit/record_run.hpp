@@ -54,6 +54,12 @@ struct RunRequest {
   /// A file of camera poses by odometry, as read_trajectory() reads: tells places apart that look
   /// alike. Empty = none.
   std::string odometry = {};
+  /// A folder with the images of a second camera, named like those of the run, so that translations
+  /// get a length. Needs `camera`; excludes `depth`. Empty = none.
+  std::string right = {};
+  /// Of a rectified pair, metres: the second camera is as the first, so far to the right of it. 0 =
+  /// the calibration in the folder tells, or the second camera of `camera_file`.
+  double baseline_m = 0;
   std::vector<std::string> other_inputs = {};  ///< more files that are never replaced
 };
 
@@ -83,9 +89,9 @@ struct RunOutcome {
 /// listener throws, run.json says why, the map has the places so far, and the exception goes on.
 ///
 /// Throws Error: kind option for a request that contradicts itself or the input, or without a
-/// folder and a map; kind input for files of truth, poses and odometry, for a mask, camera or depth
-/// that does not fit the images, and if the input has ended without a readable frame; kind output
-/// if something cannot be saved; and what MapWriter and run() throw.
+/// folder and a map; kind input for files of truth, poses and odometry, for a mask, camera, depth
+/// or second camera that does not fit the images, and if the input has ended without a readable
+/// frame; kind output if something cannot be saved; and what MapWriter and run() throw.
 RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,
                       const std::atomic<bool>& stop);
 
