@@ -18,6 +18,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "loopbit/camera_file.hpp"
+#include "loopbit/finished_run.hpp"
 #include "loopbit/read_file.hpp"
 #include "loopbit/record_run.hpp"
 #include "loopbit/text_rows.hpp"
@@ -199,6 +200,27 @@ void expect_graph(const std::string& folder) {
   EXPECT_EQ(edges, known.size());
 }
 
+/// read_run() reads the poses and the camera that a run wrote.
+void expect_read_back(const std::string& folder) {
+  const FinishedRun run = read_run(folder);
+  const std::vector<KnownRow> known = known_rows(folder);
+  std::size_t at = 0;
+  for (const LoopPose& loop : run.poses) {
+    if (loop.pose.known == PoseKnown::nothing) continue;
+    const KnownRow& row = known.at(at++);
+    EXPECT_EQ(loop.pose.known == PoseKnown::metric, row.is_metric);
+    EXPECT_EQ(loop.match, static_cast<PlaceId>(row.ids[0]));
+    EXPECT_EQ(loop.query, static_cast<PlaceId>(row.ids[1]));
+    const std::vector<double> pose = numbers(to_tum_pose(loop.pose));
+    for (std::size_t i = 0; i < pose.size(); ++i) EXPECT_NEAR(pose[i], row.pose[i], 1e-7);
+    EXPECT_EQ(loop.pose.covariance, row.covariance);
+    EXPECT_GE(loop.inliers, 15);
+  }
+  EXPECT_EQ(at, known.size());
+  ASSERT_TRUE(run.camera);
+  EXPECT_EQ(run.camera->size_px, cv::Size(320, 240));
+}
+
 /// The median.
 double middle_of(std::vector<double> values) {
   const auto middle = values.begin() + std::ssize(values) / 2;
@@ -275,6 +297,7 @@ TEST_F(DepthFolderTest, ARunWithDepthMeasuresMetres) {
   ASSERT_GT(errors.size(), 20U);
   EXPECT_LT(middle_of(errors), 0.05);
   expect_graph(path("run"));
+  expect_read_back(path("run"));
   expect_matched(path("run"));
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/report.hpp"
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -122,6 +123,48 @@ TEST_F(ReportTest, TheMapIsThePlaneInWhichTheCameraMovedMost) {
   EXPECT_EQ(json["x_m"], Json::parse("[0.0, 0.0, null, 1.0]"));
   EXPECT_EQ(json["y_m"], Json::parse("[0.0, 9.0, null, 0.0]"));
   EXPECT_EQ(json["axes"], Json::parse(R"(["x", "z"])"));
+}
+
+TEST_F(ReportTest, LoopsHaveTheirRelativePoses) {
+  ReportRun run = finished_run("run");
+  EXPECT_TRUE(Json::parse(report_json({run}))["runs"][0]["poses"].is_null());
+  // The query stands 2 m right of the match and looks ahead, or 0.1 rad to the right.
+  LoopPose aside{.query = 2, .match = 0, .inliers = 20};
+  aside.pose.status = PoseStatus::measured;
+  aside.pose.known = PoseKnown::metric;
+  aside.pose.T_match_query(0, 3) = 2;
+  aside.pose.covariance = cv::Matx66d::diag({0.01, 0.0, 0.04, 1e-6, 4e-6, 1e-6});
+  LoopPose turned{.query = 3, .match = 0, .inliers = 20};
+  turned.pose.status = PoseStatus::pure_rotation;
+  turned.pose.known = PoseKnown::rotation;
+  turned.pose.T_match_query(0, 2) = std::sin(0.1);
+  turned.pose.T_match_query(0, 0) = turned.pose.T_match_query(2, 2) = std::cos(0.1);
+  turned.pose.T_match_query(2, 0) = -std::sin(0.1);
+  run.run->poses = {{.query = 1, .match = 0}, aside, turned};
+  run.run->camera =
+      CameraModel{.size_px = {320, 240}, .fx = 200, .fy = 200, .cx = 159.5, .cy = 119.5};
+  const Json poses = Json::parse(report_json({run}))["runs"][0]["poses"];
+  EXPECT_EQ(poses["1"], Json::parse(R"({"match": 0, "status": "few_matches", "known": "nothing",
+                                        "scale": "not_asked", "inliers": 0, "points": 0})"));
+  EXPECT_EQ(poses["2"]["translation"], Json::parse("[2.0, 0.0, 0.0]"));
+  EXPECT_EQ(poses["2"]["position_from_above"], Json::parse("[0.01, 0.0, 0.04]"));
+  EXPECT_NEAR(poses["2"]["translation_sigma"].get<double>(), 0.2, 1e-9);
+  EXPECT_NEAR(poses["2"]["rotation_sigma_rad"].get<double>(), 0.002, 1e-9);
+  EXPECT_NEAR(poses["3"]["rotation_rad"].get<double>(), 0.1, 1e-9);
+  EXPECT_NEAR(poses["3"]["heading"][0].get<double>(), std::sin(0.1), 1e-9);
+  EXPECT_FALSE(poses["3"].contains("translation"));
+  // A camera that moved along x sees a point on its row, at its own column or nearer to the query.
+  const Json& lines = poses["2"]["epipolar"];
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0]["query"], Json::parse("[0.25, 0.5]"));
+  ASSERT_EQ(lines[0]["match"].size(), 1U);
+  const auto points = lines[0]["match"][0].get<std::vector<double>>();
+  ASSERT_GT(points.size(), 10U);
+  EXPECT_NEAR(points[0], 0.25, 1e-4);
+  for (std::size_t i = 0; i + 1 < points.size(); i += 2) {
+    EXPECT_NEAR(points[i + 1], 0.5, 1e-4);
+    EXPECT_TRUE(i == 0 || points[i] > points[i - 2]);
+  }
 }
 
 TEST_F(ReportTest, PicturesKeepToTheBudget) {

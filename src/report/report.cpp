@@ -25,6 +25,7 @@
 #include "loopbit/version.hpp"
 #include "loopbit/write_file.hpp"
 
+#include "loop_poses.hpp"
 #include "pictures.hpp"
 #include "report_json.hpp"
 #include "report_page.hpp"
@@ -391,6 +392,7 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
   json["positions"] = positions(run.positions_m, frames);
   json["similarity_matrix"] = nullptr;
   json["pictures"] = Json::object();
+  json["poses"] = nullptr;
   if (!run.run) return json;
 
   LoopDetectorOptions options;
@@ -405,6 +407,7 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
         matrix_json(evidence, run.list, frames, options.retrieval.shift_tolerance_columns);
     json["pictures"] = report::pictures(views, evidence, max_picture_bytes);
   }
+  json["poses"] = report::loop_poses(*run.run, json["pictures"]);
   return json;
 }
 

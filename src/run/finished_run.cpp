@@ -11,7 +11,9 @@
 #include <type_traits>
 
 #include <fmt/format.h>
+#include <opencv2/core/quaternion.hpp>
 
+#include "loopbit/camera_file.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/read_file.hpp"
 
@@ -186,6 +188,45 @@ std::vector<std::optional<cv::Vec3d>> read_positions(const std::string& path, st
   return positions;
 }
 
+/// The enumerator that a cell names.
+template <typename Enum, std::size_t kSize>
+Enum named(const Row& row, std::size_t column, const std::array<Enum, kSize>& all) {
+  const auto found =
+      std::ranges::find_if(all, [&](Enum each) { return to_string(each) == row.cell(column); });
+  if (found == all.end()) row.fail(column);
+  return *found;
+}
+
+/// Columns as poses_header() has them.
+LoopPose loop_pose_from(const Row& row) {
+  constexpr std::size_t kColumns = 16 + 21;
+  row.check_columns(kColumns);
+  LoopPose loop{.query = row.number<PlaceId>(0), .inliers = row.number<int>(13)};
+  if (row.cell(1).find(':') == std::string_view::npos) loop.match = row.number<PlaceId>(1);
+  RelativePose& pose = loop.pose;
+  pose.status = named(row, 2, kAllPoseStatuses);
+  pose.known = named(row, 3, kAllPoseKnown);
+  pose.scale = named(row, 4, kAllScaleStatuses);
+  pose.matches = row.number<int>(12);
+  pose.points = row.number<int>(14);
+  if (pose.known == PoseKnown::nothing) return loop;
+  pose.rms_px = row.number<double>(15);
+  const cv::Quatd turn(row.number<double>(11), row.number<double>(8), row.number<double>(9),
+                       row.number<double>(10));
+  const cv::Matx33d rotation = turn.toRotMat3x3();
+  std::size_t column = 16;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = i; j < 6; ++j) {
+      pose.covariance(i, j) = pose.covariance(j, i) = row.number<double>(column++);
+    }
+  }
+  for (int i = 0; i < 3; ++i) {
+    pose.T_match_query(i, 3) = row.number<double>(5 + static_cast<std::size_t>(i));
+    for (int j = 0; j < 3; ++j) pose.T_match_query(i, j) = rotation(i, j);
+  }
+  return loop;
+}
+
 }  // namespace
 
 std::vector<Detection> read_detections(const std::string& path) {
@@ -227,6 +268,11 @@ FinishedRun read_run(const std::string& path) {
   if (is_there(folder / kPositionsFile)) {
     run.positions_m = read_positions((folder / kPositionsFile).string(), run.detections.size());
   }
+  if (is_there(folder / kPosesFile)) {
+    for_each_row((folder / kPosesFile).string(), poses_header(),
+                 [&](const Row& row) { run.poses.push_back(loop_pose_from(row)); });
+  }
+  if (is_there(folder / kCameraFile)) run.camera = read_camera((folder / kCameraFile).string());
   if (is_there(folder / kEvidenceFile)) run.evidence_path = (folder / kEvidenceFile).string();
   return run;
 }

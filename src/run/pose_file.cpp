@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "loopbit/camera_file.hpp"
 #include "loopbit/write_file.hpp"
 
 #include "run_files.hpp"
@@ -26,16 +27,6 @@ void for_each_covariance(const Visit& visit) {
   for (int row = 0; row < 6; ++row) {
     for (int column = row; column < 6; ++column) visit(row, column);
   }
-}
-
-std::string header() {
-  std::string text =
-      "query,match,status,known,scale,x,y,z,qx,qy,qz,qw,matches,inliers,points,rms_px";
-  for_each_covariance([&](int row, int column) {
-    text += fmt::format(",cov_{}_{}", kAxes[static_cast<std::size_t>(row)],
-                        kAxes[static_cast<std::size_t>(column)]);
-  });
-  return text + '\n';
 }
 
 /// Cells of what is not known are empty.
@@ -54,13 +45,24 @@ std::string csv_row(PlaceId query, const std::string& match, const RelativePose&
 
 }  // namespace
 
+std::string poses_header() {
+  std::string text =
+      "query,match,status,known,scale,x,y,z,qx,qy,qz,qw,matches,inliers,points,rms_px";
+  for_each_covariance([&](int row, int column) {
+    text += fmt::format(",cov_{}_{}", kAxes[static_cast<std::size_t>(row)],
+                        kAxes[static_cast<std::size_t>(column)]);
+  });
+  return text;
+}
+
 PoseFile::PoseFile(const std::string& folder, const CameraModel& camera, LengthSources lengths)
     : camera_(camera),
       lengths_(std::move(lengths)),
       table_(folder, kPosesFile),
       graph_(folder, kPoseGraphFile),
       matched_(folder, kMatchedPosesFile) {
-  table_.append(header());
+  table_.append(poses_header() + '\n');
+  Lines(folder, kCameraFile).append(to_camera_info(camera));
   matched_.append("# timestamp x y z qx qy qz qw\n");
 }
 

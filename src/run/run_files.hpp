@@ -25,6 +25,7 @@ inline constexpr const char* kPositionsFile = "positions.csv";
 inline constexpr const char* kPosesFile = "relative_poses.csv";
 inline constexpr const char* kPoseGraphFile = "relative_poses.g2o";
 inline constexpr const char* kMatchedPosesFile = "matched_poses.tum";
+inline constexpr const char* kCameraFile = "camera.yaml";
 inline constexpr const char* kReportFile = "report.html";
 
 /// The folder in a run folder for the run that is being replaced.
@@ -34,6 +35,9 @@ inline bool is_there(const std::filesystem::path& file) {
   std::error_code error;
   return std::filesystem::exists(file, error);
 }
+
+/// The first line of relative_poses.csv, without its end.
+std::string poses_header();
 
 /// "17", or "2:17" for frame 17 of session 2 of the map; empty without a match.
 std::string match_cell(const Detection& detection);

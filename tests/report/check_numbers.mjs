@@ -302,6 +302,37 @@ async function checkTerms(page, run, frame) {
   assert.ok(Math.abs(score - run.score[frame]) < 0.01, `terms of ${frame}: ${text}`);
 }
 
+/** The relative pose of the pair is told as far as it is known. */
+async function checkPose(page, run, frame) {
+  const pose = run.poses?.[frame];
+  const shown = page.locator("[data-key='pair.pose']");
+  if (!pose || pose.match !== run.match[frame]) {
+    assert.equal(await shown.count(), 0, `pose of ${frame}`);
+    return;
+  }
+  const text = await textOf(page, "pair.pose");
+  const turned = text.match(/turned by ([\d.]+)°/);
+  assert.equal(turned !== null, pose.known !== "nothing", text);
+  if (turned) {
+    assert.ok(Math.abs(Number(turned[1]) - (pose.rotation_rad * 180) / Math.PI) <= 0.051, text);
+  }
+  const moved = text.match(/moved ([\d.]+) m ±/);
+  assert.equal(moved !== null, pose.known === "metric", text);
+  if (moved)
+    assert.ok(Math.abs(Number(moved[1]) - Math.hypot(...pose.translation)) <= 0.0051, text);
+  assert.equal(await shown.locator("ellipse").count(), pose.translation ? 1 : 0, text);
+  const isDrawn = run.pictures[frame] && run.pictures[pose.match] && pose.epipolar?.length > 0;
+  if (!isDrawn) return;
+  const lines = page.getByRole("button", { name: "epipolar lines" });
+  await lines.click();
+  const points = page.locator("#pair .epipolar circle");
+  await points.first().waitFor();
+  assert.equal(await points.count(), pose.epipolar.length);
+  await lines.click();
+  await points.first().waitFor({ state: "detached" });
+  await page.getByRole("button", { name: "inlier lines" }).click();
+}
+
 /** Late and withdrawn loops of the frame are told, with the frame that changed them. */
 async function checkChanges(page, run, frame) {
   const texts = await page.locator("[data-key='pair.change']").allTextContents();
@@ -343,6 +374,7 @@ export async function checkPairs(page, isBrief) {
         assertShows(await textOf(page, `pair.${name}`), run[name][frame], `${name} of ${frame}`);
     }
     await checkTerms(page, run, frame);
+    await checkPose(page, run, frame);
     await checkChanges(page, run, frame);
     const pictures = [run.pictures[frame], run.pictures[match]];
     const shown = await page.$$eval(

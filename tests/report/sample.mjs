@@ -451,10 +451,42 @@ function runOf(places, index, options) {
         }
       : null,
     similarity_matrix: hasContents ? madeOnce(madeMatrices, frames, matrix) : null,
+    poses: options.poses && !isExternal ? relativePosesOf(columns) : null,
     pictures: hasContents
       ? picturesOf(places, columns, truth, (1e6 * options.picturesMb) / options.runs)
       : {},
   };
+}
+
+/** A pose of every kind in turn, of the loops within the run. */
+function relativePosesOf({ status, match }) {
+  const poses = {};
+  for (const [query, place] of match.entries()) {
+    if (status[query] !== 0 || place < 0) continue;
+    const known = ["metric", "direction", "rotation", "nothing"][query % 4];
+    const pose = {
+      match: place,
+      status: "measured",
+      known,
+      scale: "known",
+      inliers: 60,
+      points: 50,
+    };
+    poses[query] = pose;
+    if (known === "rotation") pose.status = "pure_rotation";
+    if (known === "nothing") pose.status = "ambiguous";
+    if (known === "nothing") continue;
+    const turn = 0.2 * Math.sin(query);
+    Object.assign(pose, { rms_px: 0.5, rotation_rad: Math.abs(turn), rotation_sigma_rad: 0.003 });
+    pose.heading = [Math.sin(turn), 0, Math.cos(turn)];
+    if (known === "rotation") continue;
+    const length = known === "metric" ? 1.5 : 1;
+    pose.translation = [length * Math.sin(query), 0, length * Math.cos(query)];
+    pose.translation_sigma = 0.04;
+    pose.position_from_above = [0.0016, 0.0004, 0.0009];
+    pose.epipolar = [0.3, 0.7].map((x) => ({ query: [x, 0.5], match: [[x, 0.1, x + 0.1, 0.9]] }));
+  }
+  return poses;
 }
 
 const kDefaults = {

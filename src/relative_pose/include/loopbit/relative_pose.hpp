@@ -48,10 +48,17 @@ enum class PoseKnown {
 enum class ScaleStatus {
   not_asked,  ///< neither depth nor a baseline was given
   known,
-  no_depth,     ///< the match has no depth image, or it is empty
+  no_depth,     ///< the match has no depth image and no views beside, or it is empty
   no_baseline,  ///< the views beside the match were taken from the same point
   few_points,   ///< too few matches have a depth, or their depths are too uncertain
 };
+
+inline constexpr std::array kAllPoseKnown{PoseKnown::nothing, PoseKnown::rotation,
+                                          PoseKnown::direction, PoseKnown::metric};
+
+inline constexpr std::array kAllScaleStatuses{ScaleStatus::not_asked, ScaleStatus::known,
+                                              ScaleStatus::no_depth, ScaleStatus::no_baseline,
+                                              ScaleStatus::few_points};
 
 /// The enumerators' names.
 std::string_view to_string(PoseStatus status);

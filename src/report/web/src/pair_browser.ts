@@ -32,17 +32,24 @@ export class PairBrowser implements View {
   private readonly contents = new PairContents();
   private readonly facts = html("div", { class: "pair-facts" });
   private readonly lines: HTMLButtonElement;
+  private readonly epipolar: HTMLButtonElement;
   private readonly order: HTMLButtonElement;
   private readonly enlarged: HTMLDialogElement;
   readonly player: Player;
   readonly review: Review;
-  private withLines = true;
+  private shownLines: "inliers" | "epipolar" | null = "inliers";
 
   constructor(private readonly store: Store) {
     this.filters = new Filters(store);
     this.player = new Player(store);
     this.review = new Review(store);
-    this.lines = button({ class: "quiet" }, () => this.toggleLines(), "inlier lines");
+    this.lines = button({ class: "quiet" }, () => this.toggle("inliers"), "inlier lines");
+    const where = "Points of the query, and where the match may see them by the relative pose";
+    this.epipolar = button(
+      { class: "quiet", title: where },
+      () => this.toggle("epipolar"),
+      "epipolar lines",
+    );
     const weakest = "Visit loops by rising score, the weakest first";
     this.order = button(
       { class: "quiet", title: weakest },
@@ -78,6 +85,7 @@ export class PairBrowser implements View {
         "div",
         { class: "pair-tools" },
         this.lines,
+        this.epipolar,
         button({ class: "quiet", title: "Enlarge (e)" }, () => this.enlarge(), "enlarge"),
         saveButtons("Query and match", () => this.pictures.figure()),
       ),
@@ -98,12 +106,14 @@ export class PairBrowser implements View {
     this.number.value = String(selection.frame);
     this.showPosition(selection);
     this.showPartners(model, selection);
-    setPressed(this.lines, this.withLines);
+    setPressed(this.lines, this.shownLines === "inliers");
+    setPressed(this.epipolar, this.shownLines === "epipolar");
+    this.epipolar.hidden = model.run.poses === null;
     setPressed(this.order, selection.order === "weakest");
     this.review.show();
     this.facts.replaceChildren(...pairFacts(model, selection));
     this.contents.show(model, selection);
-    void this.pictures.show(model, selection, this.withLines);
+    void this.pictures.show(model, selection, this.shownLines);
   }
 
   /** Shows the pictures as large as the window, or back in their place. */
@@ -154,8 +164,8 @@ export class PairBrowser implements View {
     this.partners.hidden = choices.length < 2;
   }
 
-  private toggleLines(): void {
-    this.withLines = !this.withLines;
+  private toggle(lines: "inliers" | "epipolar"): void {
+    this.shownLines = this.shownLines === lines ? null : lines;
     this.showSelection(this.store.now);
   }
 

@@ -3,6 +3,7 @@
 
 import { type Child, html } from "./dom.ts";
 import * as format from "./format.ts";
+import { pairPose } from "./pair_pose.ts";
 import { candidateName } from "./partner.ts";
 import type { ScoreTerms } from "./report_data.ts";
 import type { RunModel } from "./run_model.ts";
@@ -104,7 +105,9 @@ export function pairFacts(model: RunModel, selection: Selection): HTMLElement[] 
     facts.append(fact("took", "took", `${format.milliseconds(model.totals_ms[frame] ?? 0)} ms`));
   }
   const terms = termsOf(model, frame);
-  const shown = [line, why, facts, ...(terms ? [terms] : []), ...changesOf(model, frame)];
+  const pose = pairPose(model, selection);
+  const shown = [line, why, facts, ...[terms, pose].filter((each) => each !== null)];
+  shown.push(...changesOf(model, frame));
   if (model.isWithCandidate(selection) || !has) return shown;
   const whose = `Values of its ${candidateName(model, frame)}, which is not shown:`;
   return [html("p", { class: "whose", "data-key": "pair.whose" }, whose), ...shown];

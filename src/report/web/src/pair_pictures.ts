@@ -3,7 +3,9 @@
 
 import { bytesOf } from "./content.ts";
 import { html, svg } from "./dom.ts";
+import { poseOf } from "./pair_pose.ts";
 import { absenceOf, partnerAbsence, partnerName } from "./partner.ts";
+import type { EpipolarLine } from "./report_data.ts";
 import type { RunModel } from "./run_model.ts";
 import { type Figure, figureOf } from "./save.ts";
 import type { Selection } from "./store.ts";
@@ -27,7 +29,8 @@ export class PairPictures {
     return drawingOf(this.element);
   }
 
-  async show(model: RunModel, selection: Selection, withLines: boolean) {
+  /** `lines`: the inliers, epipolar lines, or nothing. */
+  async show(model: RunModel, selection: Selection, lines: "inliers" | "epipolar" | null) {
     const turn = ++this.shown;
     const { frame } = selection;
     const [query, partner] = await Promise.all([
@@ -39,8 +42,8 @@ export class PairPictures {
     const partnerAspect = aspectOf(partner) ?? aspect;
     const isStacked = 1 / Math.min(aspect, partnerAspect) > kWide;
     this.element.classList.toggle("stacked", isStacked);
-    const isDrawn = withLines && model.isWithCandidate(selection) && query && partner;
-    const inliers = isDrawn ? inliersOf(model, frame) : new Float32Array();
+    const isDrawn = model.isWithCandidate(selection) && query && partner;
+    const inliers = isDrawn && lines === "inliers" ? inliersOf(model, frame) : new Float32Array();
     const name = partnerName(model, selection);
     this.element.setAttribute(
       "aria-label",
@@ -61,6 +64,10 @@ export class PairPictures {
       const mark = model.mark(frame) ?? "none";
       this.element.append(linesOf(inliers, aspect, partnerAspect, isStacked, mark));
     }
+    const epipolar = poseOf(model, selection)?.epipolar ?? [];
+    if (lines === "epipolar" && query && partner && epipolar.length > 0) {
+      this.element.append(epipolarOf(epipolar, aspect, partnerAspect, isStacked));
+    }
   }
 }
 
@@ -77,7 +84,7 @@ function drawingOf(element: HTMLElement): Figure | null {
     return `<image x="${x}" y="${y}" ${size} href="${image.src}"></image>`;
   });
   const [width, height] = [Math.round(scale * whole.width), Math.round(scale * whole.height)];
-  const lines = element.querySelector("svg.inliers");
+  const lines = element.querySelector("svg.inliers, svg.epipolar");
   if (lines) {
     const colour = getComputedStyle(lines).getPropertyValue("--line").trim();
     const view = `viewBox="${lines.getAttribute("viewBox")}" preserveAspectRatio="none"`;
@@ -131,6 +138,44 @@ function framed(
   return box;
 }
 
+/** A drawing over both pictures, and where the second one begins; the first is 1 wide. */
+function overlay(kind: string, aspect: number, partnerAspect: number, isStacked: boolean) {
+  const size = isStacked
+    ? [1, aspect + partnerAspect + kGap]
+    : [2 + kGap, Math.max(aspect, partnerAspect)];
+  const [dx, dy] = isStacked ? [0, aspect + kGap] : [1 + kGap, 0];
+  const drawing = svg("svg", {
+    class: kind,
+    viewBox: `0 0 ${size.join(" ")}`,
+    preserveAspectRatio: "none",
+    "aria-hidden": "true",
+  });
+  return { drawing, dx, dy };
+}
+
+/** Points of the query, and in the same colour where the match may see them. */
+function epipolarOf(
+  lines: readonly EpipolarLine[],
+  aspect: number,
+  partnerAspect: number,
+  isStacked: boolean,
+): SVGSVGElement {
+  const { drawing, dx, dy } = overlay("epipolar", aspect, partnerAspect, isStacked);
+  for (const [i, { query, match }] of lines.entries()) {
+    const colour = `hsl(${Math.round((360 * i) / lines.length)} 90% 60%)`;
+    const [cx, cy] = [query[0], query[1] * aspect];
+    drawing.append(svg("circle", { cx, cy, r: kDot, fill: colour }));
+    for (const part of match) {
+      const points = Array.from({ length: part.length / 2 }, (_, k) => {
+        const [x = 0, y = 0] = part.slice(2 * k, 2 * k + 2);
+        return `${x + dx},${y * partnerAspect + dy}`;
+      });
+      drawing.append(svg("polyline", { points: points.join(" "), stroke: colour }));
+    }
+  }
+  return drawing;
+}
+
 function linesOf(
   inliers: Float32Array,
   aspect: number,
@@ -138,19 +183,11 @@ function linesOf(
   isStacked: boolean,
   mark: string,
 ): SVGSVGElement {
-  const size = isStacked
-    ? [1, aspect + partnerAspect + kGap]
-    : [2 + kGap, Math.max(aspect, partnerAspect)];
-  const [dx, dy] = isStacked ? [0, aspect + kGap] : [1 + kGap, 0];
   const count = inliers.length / 4;
   const density = `${count > kManyLines ? " many" : ""}${count > kCrowd ? " crowd" : ""}`;
   const r = count > kCrowd ? 0.7 * kDot : kDot;
-  const drawing = svg("svg", {
-    class: `inliers ${mark}${density}`,
-    viewBox: `0 0 ${size.join(" ")}`,
-    preserveAspectRatio: "none",
-    "aria-hidden": "true",
-  });
+  const kind = `inliers ${mark}${density}`;
+  const { drawing, dx, dy } = overlay(kind, aspect, partnerAspect, isStacked);
   for (let i = 0; i + 3 < inliers.length; i += 4) {
     const [x1, y1, x2, y2] = inliers.subarray(i, i + 4) as unknown as [
       number,

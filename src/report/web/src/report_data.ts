@@ -79,6 +79,8 @@ export interface Run {
     axes: [x: string, y: string];
   } | null;
   similarity_matrix: SimilarityMatrix | null;
+  /** Relative poses of loops by query; null if none were measured. */
+  poses: Record<string, LoopPose> | null;
   /** By frame number. Not every frame has one: the report has a size budget, which the first
    * frame, wrong loops and the weakest loops use before others. */
   pictures: Record<string, Picture>;
@@ -100,6 +102,38 @@ export interface ScoreTerms {
   path: (number | null)[];
   rivals: (number | null)[];
   prior: (number | null)[];
+}
+
+/** The pose of the query's camera in the frame of the match's (x right, y down, z ahead). */
+export interface LoopPose {
+  /** Null if it is in an earlier session of the map. */
+  match: number | null;
+  /** Names as in relative_poses.csv; see docs/poses.md. */
+  status: string;
+  known: "nothing" | "rotation" | "direction" | "metric";
+  scale: string;
+  inliers: number;
+  points: number;
+  /** From here on missing if nothing is known. */
+  rms_px?: number;
+  rotation_rad?: number;
+  rotation_sigma_rad?: number;
+  /** Where the query looks. */
+  heading?: [x: number, y: number, z: number];
+  /** In metres, or of length 1; missing if only the rotation is known. So are its largest standard
+   * deviation and its covariance seen from above. */
+  translation?: [x: number, y: number, z: number];
+  translation_sigma?: number;
+  position_from_above?: [xx: number, xz: number, zz: number];
+  /** Missing for frames without a picture. */
+  epipolar?: EpipolarLine[];
+}
+
+/** A point in the query, and where the match may see it: parts of a curve as x, y, x, y ... Each from
+ * 0 to 1 of width or height. */
+export interface EpipolarLine {
+  query: [x: number, y: number];
+  match: number[][];
 }
 
 export interface StepTimes {

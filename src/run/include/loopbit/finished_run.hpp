@@ -8,13 +8,23 @@
 
 #include <opencv2/core.hpp>
 
+#include "loopbit/camera.hpp"
 #include "loopbit/detection.hpp"
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/match_list.hpp"
+#include "loopbit/relative_pose.hpp"
 #include "loopbit/run_record.hpp"
 #include "loopbit/scoring.hpp"
 
 namespace loopbit {
+
+/// The relative pose of a loop, as relative_poses.csv has it.
+struct LoopPose {
+  PlaceId query = 0;
+  std::optional<PlaceId> match = std::nullopt;  ///< none: a frame of an earlier session
+  RelativePose pose = {};                       ///< without the list of its inliers
+  int inliers = 0;
+};
 
 /// The folder of a run; see docs/run_folder.md.
 struct FinishedRun {
@@ -25,7 +35,9 @@ struct FinishedRun {
   std::optional<GroundTruth> truth;  ///< the truth that the run was given
   /// Camera centres, one per frame; empty if the run had no poses.
   std::vector<std::optional<cv::Vec3d>> positions_m;
-  std::string evidence_path;  ///< empty if there is none
+  std::string evidence_path;          ///< empty if there is none
+  std::vector<LoopPose> poses;        ///< empty if none were measured
+  std::optional<CameraModel> camera;  ///< of the images, if it is known
 
   /// The frames of the run, with their times.
   [[nodiscard]] FramesRead frames() const;
