@@ -68,8 +68,9 @@ std::vector<std::string> section_names() {
 }
 
 TEST(OptionFields, EverySectionIsVisited) {
-  EXPECT_EQ(section_names(), (std::vector<std::string>{"binary_content", "retrieval", "surf",
-                                                       "verification", "exclusion", "decision"}));
+  EXPECT_EQ(section_names(),
+            (std::vector<std::string>{"binary_content", "retrieval", "surf", "verification",
+                                      "exclusion", "decision", "odometry"}));
   EXPECT_EQ(section_names().size(), count_members<LoopDetectorOptions>());
 }
 

@@ -106,7 +106,7 @@ Json pose_json(const LoopPose& loop) {
             {"points", pose.points}};
   if (pose.known == PoseKnown::nothing) return json;
   const cv::Matx33d turn = rotation_of(pose);
-  const cv::Vec3d ahead = turn.col(2);
+  const cv::Vec3d ahead(turn(0, 2), turn(1, 2), turn(2, 2));
   json["rms_px"] = pose.rms_px;
   json["rotation_rad"] = std::acos(std::clamp((cv::trace(turn) - 1) / 2, -1.0, 1.0));
   json["rotation_sigma_rad"] = largest_sigma(pose.covariance, 3);

@@ -215,7 +215,7 @@ def test_frames_that_nobody_knows():
 
 
 # Flags of 'loopbit run' that run_folder() has by another name, or not at all.
-RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views": "views",
+RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views": "views", "baseline": "baseline_m",
            "truth_variable": "variable", "poses": "positions_m", "no_report": "evidence"}
 OF_OPTIONS = {"preset", "config", "set"}
 OF_SOURCE = {"every", "limit", "max_megapixels", "topic"}

@@ -17,6 +17,7 @@
 #include "circuit.hpp"
 #include "column_tracer.hpp"
 #include "drive.hpp"
+#include "fisheye.hpp"
 #include "light.hpp"
 #include "shader.hpp"
 #include "town.hpp"
@@ -37,6 +38,7 @@ constexpr double kDrivenBetween_m = 50.0;
 constexpr double kCosSame = 0.8660254037844386;  // 30 degrees
 constexpr double kCosNear = 0.5;                 // 60 degrees
 constexpr double kFramesPerSecond = 10.0;
+constexpr double kRadPerDeg = std::numbers::pi / 180;
 
 constexpr float kNightNoise = 8.0F;  // standard deviation in grey levels
 constexpr float kNightGrey = 0.9F;   // share of the colour that is lost
@@ -119,6 +121,7 @@ struct World::Plan {
   }
   [[nodiscard]] std::vector<View> views() const;
   [[nodiscard]] PlaceRule rule(double distance_m, double cos_turn) const;
+  void draw(int frame, const Camera& camera, FisheyeLens::Image& columns) const;
   void store(int frame, int column, const std::vector<Color>& rows, cv::Mat& image) const;
 
   WorldOptions options;
@@ -168,6 +171,22 @@ PlaceRule World::Plan::rule(double distance_m, double cos_turn) const {
           static_cast<int>(std::ceil(kDrivenBetween_m / options.spacing_m))};
 }
 
+/// What a pinhole camera at a place of `frame` sees: columns, of rows.
+void World::Plan::draw(int frame, const Camera& camera, FisheyeLens::Image& columns) const {
+  const Scene around = scene(frame, camera.eye);
+  const Light light = light_of_lap(seed, drive.lap(frame), options.light_change,
+                                   from_second_lap(frame, options.night));
+  const ColumnTracer tracer(camera, around);
+  Shader shader(camera, around, town, light, seed);
+  std::vector<Piece> pieces;
+  columns.assign(static_cast<std::size_t>(camera.width_px),
+                 std::vector<Color>(static_cast<std::size_t>(camera.height_px)));
+  for (int column = 0; column < camera.width_px; ++column) {
+    const float skyline_px = tracer.trace(column, pieces);
+    shader.draw(column, pieces, skyline_px, columns[static_cast<std::size_t>(column)]);
+  }
+}
+
 void World::Plan::store(int frame, int column, const std::vector<Color>& rows,
                         cv::Mat& image) const {
   const std::uint32_t noise = hash_of(seed ^ kNoiseSalt, frame, column);
@@ -212,10 +231,15 @@ bool World::blank(int frame) const {
 CameraModel World::camera(int frame) const {
   assert(frame >= 0 && frame < options().frames);
   const Camera camera = plan_->camera(frame);
+  const bool is_fisheye = options().fisheye_deg > 0;
+  const double focal_px = is_fisheye
+                              ? FisheyeLens(camera, options().fisheye_deg * kRadPerDeg).focal_px()
+                              : camera.focal_px;
   // A pixel's middle is half a pixel from its edges, from which the tracer counts.
-  return {.size_px = {camera.width_px, camera.height_px},
-          .fx = camera.focal_px,
-          .fy = camera.focal_px,
+  return {.lens = is_fisheye ? Lens::equidistant : Lens::pinhole,
+          .size_px = {camera.width_px, camera.height_px},
+          .fx = focal_px,
+          .fy = focal_px,
           .cx = camera.width_px / 2.0 - 0.5,
           .cy = camera.horizon_px - 0.5};
 }
@@ -235,6 +259,7 @@ cv::Mat1f World::depth_m(int frame) const {
   const Scene scene = plan_->scene(frame, camera.eye);
   const ColumnTracer tracer(camera, scene);
   cv::Mat1f depth_m(camera.height_px, camera.width_px, 0.0F);
+  if (options().fisheye_deg > 0) return depth_m;
   std::vector<Piece> pieces;
   for (int column = 0; column < camera.width_px; ++column) {
     tracer.trace(column, pieces);
@@ -254,20 +279,18 @@ cv::Mat World::render(int frame, double right_m) const {
   assert(frame >= 0 && frame < options().frames);
   Camera camera = plan_->camera(frame);
   camera.eye = camera.eye + left_of(camera.forward) * -right_m;
-  const Scene scene = plan_->scene(frame, camera.eye);
-  const Light light =
-      light_of_lap(plan_->seed, plan_->drive.lap(frame), plan_->options.light_change,
-                   plan_->from_second_lap(frame, options().night));
-  const ColumnTracer tracer(camera, scene);
-  Shader shader(camera, scene, plan_->town, light, plan_->seed);
-
+  FisheyeLens::Image columns;
+  if (options().fisheye_deg > 0) {
+    columns = FisheyeLens(camera, options().fisheye_deg * kRadPerDeg)
+                  .render([&](const Camera& face, FisheyeLens::Image& seen) {
+                    plan_->draw(frame, face, seen);
+                  });
+  } else {
+    plan_->draw(frame, camera, columns);
+  }
   cv::Mat image(camera.height_px, camera.width_px, CV_8UC3);
-  std::vector<Piece> pieces;
-  std::vector<Color> rows(static_cast<std::size_t>(camera.height_px));
   for (int column = 0; column < camera.width_px; ++column) {
-    const float skyline_px = tracer.trace(column, pieces);
-    shader.draw(column, pieces, skyline_px, rows);
-    plan_->store(frame, column, rows, image);
+    plan_->store(frame, column, columns[static_cast<std::size_t>(column)], image);
   }
   return image;
 }

@@ -26,6 +26,7 @@ struct WorldOptions {
   int seed = 1;
   int width_px = 640;
   int height_px = 480;
+  double fisheye_deg = 0.0;
   double laps = 2.25;
   double spacing_m = 0.9;
   double lateral_offset_m = 1.0;
@@ -49,6 +50,9 @@ struct WorldOptions {
         Field{"width_px", &W::width_px, 64, 4096,
               "Width of a frame, px; the field of view is 80 degrees"},
         Field{"height_px", &W::height_px, 48, 4096, "Height of a frame, px"},
+        Field{"fisheye_deg", &W::fisheye_deg, 0.0, 170.0,
+              "Degrees that an equidistant lens sees across the width; beyond 80 degrees from its "
+              "axis the image is black (0 = no such lens)"},
         Field{"laps", &W::laps, 1.0, 1000.0, "Number of laps"},
         Field{"spacing_m", &W::spacing_m, 0.02, 20.0,
               "Distance driven between two frames (0.1 s), m"},
@@ -119,12 +123,13 @@ class World {
   /// From the frame of the camera to the world: x east, y down, z north, the ground at y = 0.
   [[nodiscard]] cv::Matx44d T_world_camera(int frame) const;
 
-  /// The camera image: BGR, 8 bits per channel. About 25 ms on one core for 640 x 480. `right_m`:
+  /// The camera image: BGR, 8 bits per channel. About 25 ms on one core for 640 x 480, and
+  /// 100 ms with a fisheye lens. `right_m`:
   /// as a second camera sees it, that far to the right of the first.
   [[nodiscard]] cv::Mat render(int frame, double right_m = 0) const;
 
   /// The depth along the camera's axis for each pixel, m. 0 in the sky and where something flat, a
-  /// tree or a person, stands before it.
+  /// tree or a person, stands before it, and everywhere with a fisheye lens.
   [[nodiscard]] cv::Mat1f depth_m(int frame) const;
 
   /// All pairs of frames that show the same place: camera centres at most same_place_m apart,
