@@ -367,6 +367,20 @@ TEST_F(RightImagesTest, ARunWithAStereoPairMeasuresMetres) {
   EXPECT_EQ(read_file(chain + "/relative_poses.csv"), read_file(rectified + "/relative_poses.csv"));
 }
 
+TEST_F(RightImagesTest, ARunWithOdometryMeasuresMetres) {
+  const World world = drive();
+  RunRequest request{.folder = path("run"),
+                     .evidence = false,
+                     .camera = read_camera(path("town/camera.yaml")),
+                     .camera_file = "camera.yaml",
+                     .odometry = path("town/poses.txt")};
+  RunInput input(open_source(path("town/images")), path("town/images"));
+  record_run(input, request, {[](const Detection&) {}, [](const std::string&) {}}, false);
+  const std::vector<double> errors = length_errors(path("run/relative_poses.csv"), world);
+  ASSERT_GT(errors.size(), 20U);
+  EXPECT_LT(middle_of(errors), 0.05);
+}
+
 TEST_F(RightImagesTest, ARightCameraThatIsNotKnownIsRefused) {
   cv::imwrite(path("right.png"), cv::Mat1b(480, 640, 7));
   for (const char* name : {"town/images/0.png", "right/0.png"}) {

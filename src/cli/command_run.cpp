@@ -135,7 +135,8 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   command
       ->add_option("--odometry", flags->session.run.odometry,
                    "Poses of the camera by odometry (TUM, KITTI, EuRoC, or TUM with covariances), "
-                   "matched by time or row. --set odometry.NAME=VALUE says how fast it drifts")
+                   "matched by time or row; with a camera, relative poses are in metres. --set "
+                   "odometry.NAME=VALUE says how fast it drifts")
       ->type_name("FILE");
   CLI::Option* right =
       command

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <filesystem>
 #include <string_view>
 #include <utility>
@@ -81,7 +82,7 @@ void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
   const Features match =
       detector.features_of(loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}));
   if (query.working_size_px != match.working_size_px) return;
-  const RelativePose pose = measured(loop, query, match);
+  const RelativePose pose = measured(loop, query, match, detector);
   table_.append(csv_row(loop.frame, match_cell(loop), pose));
   add_edge(loop, pose);
   if (pose.known != PoseKnown::metric) return;
@@ -90,21 +91,52 @@ void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
                               to_tum_pose(pose)));
 }
 
-/// With an empty depth image where there should be a depth or a right image, but is none.
-RelativePose PoseFile::measured(const LateLoop& loop, const Features& query,
-                                const Features& match) {
+/// With an empty depth image where there should be a length, but nothing gives it.
+RelativePose PoseFile::measured(const LateLoop& loop, const Features& query, const Features& match,
+                                const LoopDetector& detector) {
   PoseRequest request{.query = {&query, &camera_}, .match = {&match, &camera_}};
   const cv::Mat1f depth_m = depth_of(loop);
-  if (lengths_.depth || lengths_.right) request.match_depth_m = &depth_m;
-  Features right;
-  std::vector<NearbyView> beside;
-  if (lengths_.right && loop.match) {
-    const RightCamera& camera = lengths_.right->camera();
-    right = lengths_.right->features_of(shots_.at(static_cast<std::size_t>(*loop.match)).name);
-    if (!right.keypoints.empty()) beside = {{{&right, &camera.camera}, camera.T_left_right}};
+  if (lengths_.depth || lengths_.right || lengths_.odometry) request.match_depth_m = &depth_m;
+  Beside beside;
+  if (lengths_.right) {
+    add_right(loop, beside);
+  } else if (lengths_.odometry && !lengths_.depth) {
+    add_neighbours(loop, detector, beside);
   }
-  request.beside = beside;
+  request.beside = beside.views;
   return estimator_.estimate(request);
+}
+
+void PoseFile::add_right(const LateLoop& loop, Beside& beside) {
+  if (!loop.match) return;
+  const RightCamera& right = lengths_.right->camera();
+  const std::string& name = shots_.at(static_cast<std::size_t>(*loop.match)).name;
+  beside.features.push_back(lengths_.right->features_of(name));
+  if (beside.features.back().keypoints.empty()) return;
+  beside.views.push_back({{&beside.features.back(), &right.camera}, right.T_left_right});
+}
+
+/// Of a match of this session.
+void PoseFile::add_neighbours(const LateLoop& loop, const LoopDetector& detector,
+                              Beside& beside) const {
+  constexpr double kMinBaseline_m = 0.5;
+  constexpr PlaceId kMaxFrames = 300;  // a camera that stands still has no neighbours
+  if (!loop.match) return;
+  for (const PlaceId step : {-1, 1}) {
+    for (PlaceId frame = *loop.match + step;
+         frame >= 0 && frame < loop.frame && std::abs(frame - *loop.match) <= kMaxFrames;
+         frame += step) {
+      const auto motion = track_.between(*loop.match, frame);
+      if (!motion) continue;
+      const cv::Matx44d& t = motion->T_from_to;
+      if (cv::norm(cv::Vec3d(t(0, 3), t(1, 3), t(2, 3))) < kMinBaseline_m) continue;
+      Features seen = detector.features_of({0, frame});
+      if (seen.keypoints.empty()) continue;
+      beside.features.push_back(std::move(seen));
+      beside.views.push_back({{&beside.features.back(), &camera_}, t});
+      break;
+    }
+  }
 }
 
 /// An edge to another session is left out: its frames have numbers of their own. A vertex comes

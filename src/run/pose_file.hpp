@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <deque>
 #include <fstream>
 #include <optional>
 #include <set>
@@ -11,6 +12,7 @@
 #include "loopbit/camera.hpp"
 #include "loopbit/detection.hpp"
 #include "loopbit/loop_detector.hpp"
+#include "loopbit/odometry.hpp"
 #include "loopbit/relative_pose.hpp"
 
 #include "depth_folder.hpp"
@@ -22,6 +24,7 @@ namespace loopbit {
 struct LengthSources {
   std::optional<DepthFolder> depth;
   std::optional<RightImages> right;
+  bool odometry = false;  ///< see PoseFile::add_odometry()
 };
 
 /// Writes relative_poses.csv, one row per loop, and what is known of it as relative_poses.g2o and
@@ -31,6 +34,10 @@ class PoseFile {
   /// `camera`: of all images, with their size. Throws Error (kind output).
   PoseFile(const std::string& folder, const CameraModel& camera, LengthSources lengths);
 
+  /// What odometry says at the next frame, before its detection. Without depth and right images,
+  /// the nearest frames before and after a match that are 0.5 m away from it give a length.
+  void add_odometry(const std::optional<OdometryPose>& pose) { track_.add(pose); }
+
   /// Measures the poses of its loops, also late ones, and hands the lines to the system. `detector`
   /// has the features of both frames. Loops between images of different shapes are left out: they
   /// cannot be from one camera. Throws Error (kind output), and what features_of() throws.
@@ -38,8 +45,15 @@ class PoseFile {
 
  private:
   void add_loop(const LateLoop& loop, const LoopDetector& detector);
+  /// The views beside a match, and the features that they show.
+  struct Beside {
+    std::deque<Features> features;
+    std::vector<NearbyView> views;
+  };
   [[nodiscard]] RelativePose measured(const LateLoop& loop, const Features& query,
-                                      const Features& match);
+                                      const Features& match, const LoopDetector& detector);
+  void add_right(const LateLoop& loop, Beside& beside);
+  void add_neighbours(const LateLoop& loop, const LoopDetector& detector, Beside& beside) const;
   [[nodiscard]] cv::Mat1f depth_of(const LateLoop& loop) const;
   void add_edge(const LateLoop& loop, const RelativePose& pose);
 
@@ -61,6 +75,7 @@ class PoseFile {
 
   CameraModel camera_;
   LengthSources lengths_;
+  OdometryTrack track_;
   std::vector<Shot> shots_;  ///< one per frame
   RelativePoseEstimator estimator_;
   Lines table_;

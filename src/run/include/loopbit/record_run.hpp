@@ -52,7 +52,7 @@ struct RunRequest {
   std::string depth = {};
   double depth_scale = kTumDepthUnitsPerM;  ///< 16-bit depth: units per metre
   /// A file of camera poses by odometry, as read_trajectory() reads: tells places apart that look
-  /// alike. Empty = none.
+  /// alike, and gives translations a length where there are no depth or right images. Empty = none.
   std::string odometry = {};
   /// A folder with the images of a second camera, named like those of the run, so that translations
   /// get a length. Needs `camera`; excludes `depth`. Empty = none.
