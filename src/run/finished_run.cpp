@@ -191,7 +191,7 @@ std::vector<std::optional<cv::Vec3d>> read_positions(const std::string& path, st
 /// The enumerator that a cell names.
 template <typename Enum, std::size_t kSize>
 Enum named(const Row& row, std::size_t column, const std::array<Enum, kSize>& all) {
-  const auto found =
+  const auto* const found =
       std::ranges::find_if(all, [&](Enum each) { return to_string(each) == row.cell(column); });
   if (found == all.end()) row.fail(column);
   return *found;

@@ -208,20 +208,26 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
   return {folder, request.overwrite || is_unanswered(folder), inputs};
 }
 
+/// What a run reads beside its images, checked against the first of them.
+struct Inputs {
+  cv::Mat1b mask;
+  std::optional<CameraModel> camera;
+  LengthSources lengths;
+  std::optional<OdometryFile> odometry;
+};
+
 /// A run, from its folder to its end.
 class RecordedRun {
  public:
-  RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected,
-              const cv::Mat1b& mask, const std::optional<CameraModel>& camera,
-              LengthSources lengths, std::optional<OdometryFile> odometry)
+  RecordedRun(RunInput& input, const RunRequest& request, FramesRead expected, Inputs inputs)
       : input_(input),
         request_(request),
-        camera_(camera),
-        lengths_(std::move(lengths)),
-        odometry_(std::move(odometry)),
+        camera_(inputs.camera),
+        lengths_(std::move(inputs.lengths)),
+        odometry_(std::move(inputs.odometry)),
         frames_(std::move(expected)),
         map_(open_map(input, request)),
-        detector_(make_detector(request, map_, mask)),
+        detector_(make_detector(request, map_, inputs.mask)),
         record_(record_of(input, request)),
         folder_(make_folder(input, request, map_ ? map_->session() : 0)) {
     if (map_) record_.map_session = map_->session();
@@ -356,10 +362,12 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
   if (request.overwrite || request.options.exclusion.seconds > 0) {
     check_time(input.prove(), request.options);
   }
-  const cv::Mat1b mask = mask_of(input, request);
-  const std::optional<CameraModel> camera = camera_of(input, request);
-  RecordedRun run(input, request, expected, mask, camera, lengths_of(request, camera),
-                  odometry_of(input, request, expected));
+  Inputs inputs;
+  inputs.mask = mask_of(input, request);
+  inputs.camera = camera_of(input, request);
+  inputs.lengths = lengths_of(request, inputs.camera);
+  inputs.odometry = odometry_of(input, request, expected);
+  RecordedRun run(input, request, expected, std::move(inputs));
   try {
     run.detect(listener, stop);
   } catch (const std::exception& error) {

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "right_images.hpp"
 
-#include <utility>
-
 #include <fmt/format.h>
 
 #include "loopbit/camera_file.hpp"
@@ -48,8 +46,9 @@ RightCamera right_camera(const std::string& folder, double baseline_m, const Cam
   return right;
 }
 
-RightImages::RightImages(const std::string& folder, RightCamera right, const SurfOptions& options)
-    : right_(std::move(right)), by_stem_(images_by_stem(folder, "right images")), surf_(options) {
+RightImages::RightImages(const std::string& folder, const RightCamera& right,
+                         const SurfOptions& options)
+    : right_(right), by_stem_(images_by_stem(folder, "right images")), surf_(options) {
   if (by_stem_.empty()) {
     throw Error(ErrorKind::input,
                 fmt::format("'{}' has no images; give a folder of images named like those of the "

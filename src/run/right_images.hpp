@@ -31,7 +31,7 @@ class RightImages {
  public:
   /// Reads the first image, to check it. Throws Error (kind input) if there are no images, or it
   /// cannot be read or does not fit the camera.
-  RightImages(const std::string& folder, RightCamera right, const SurfOptions& options);
+  RightImages(const std::string& folder, const RightCamera& right, const SurfOptions& options);
 
   /// The features of the image that belongs to the image `name` of the first camera. Empty if there
   /// is none, or none that can be read.

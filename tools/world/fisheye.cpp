@@ -70,8 +70,8 @@ Color FisheyeLens::color_of(const Ray& ray, const std::array<Image, 3>& images) 
   const int top = std::clamp(floor_int(y), 0, face.height_px - 2);
   const auto across = static_cast<float>(std::clamp(x - left, 0.0, 1.0));
   const auto along = static_cast<float>(std::clamp(y - top, 0.0, 1.0));
-  const auto at = [&](int dx) {
-    const auto& rows = image[static_cast<std::size_t>(left + dx)];
+  const auto at = [&](std::size_t dx) {
+    const auto& rows = image[static_cast<std::size_t>(left) + dx];
     return blend(rows[static_cast<std::size_t>(top)], rows[static_cast<std::size_t>(top) + 1],
                  along);
   };
