@@ -104,7 +104,7 @@ std::optional<double> length_m(std::span<const RayPair> pairs, const RigidPose& 
   return std::max(median(std::move(lengths)), 0.0);
 }
 
-/// SQPnP of all points (Terzakis and Lourakis 2020).
+/// RANSAC on the points, and SQPnP of its inliers (Terzakis and Lourakis 2020).
 std::optional<RigidPose> pose_of_points(std::span<const RayPair> pairs) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> seen;
@@ -116,14 +116,27 @@ std::optional<RigidPose> pose_of_points(std::span<const RayPair> pairs) {
     seen.emplace_back(q[0] / q[2], q[1] / q[2]);
   }
   if (static_cast<int>(points.size()) < kMinPoints) return std::nullopt;
+  constexpr int kRounds = 100;
+  constexpr float kMaxError = 0.01F;  // of a focal length: a start need not be exact
+  constexpr double kConfidence = 0.99;
   cv::Vec3d turn;
   cv::Vec3d translation;
-  if (!cv::solvePnP(points, seen, cv::Matx33d::eye(), cv::noArray(), turn, translation, false,
-                    cv::SOLVEPNP_SQPNP)) {
+  if (!cv::solvePnPRansac(points, seen, cv::Matx33d::eye(), cv::noArray(), turn, translation, false,
+                          kRounds, kMaxError, kConfidence, cv::noArray(), cv::SOLVEPNP_SQPNP)) {
     return std::nullopt;
   }
   const cv::Matx33d back = rotation_by(turn);  // from the match's frame to the query's
   return RigidPose{back.t(), -(back.t() * translation)};
+}
+
+/// Whether a fit in another minimum, its position apart by more than a small share of the distance
+/// of the points, explains them about as well as `best`.
+bool has_rival(std::span<const PoseFit> fits, const PoseFit& best, double distance_m) {
+  constexpr double kApart = 0.02;
+  return std::ranges::any_of(fits, [&](const PoseFit& fit) {
+    return fit.cost < kMaxWorse * best.cost &&
+           cv::norm(fit.pose.translation - best.pose.translation) > kApart * distance_m;
+  });
 }
 
 }  // namespace
@@ -247,7 +260,7 @@ class RelativePoseEstimator::Impl {
     const auto inliers = inliers_of(pairs_, fit->pose, FitKind::metric, gate());
     const auto points = std::ranges::count_if(inliers, &RayPair::has_depth);
     if (points < kMinPoints || static_cast<int>(inliers.size()) < options_.min_inliers) return;
-    if (contradicts_directions(fit->pose, result.status)) {
+    if (has_metric_rival_ || contradicts_directions(fit->pose, result.status)) {
       result.status = PoseStatus::ambiguous;
       result.known = PoseKnown::nothing;
       return;
@@ -282,8 +295,8 @@ class RelativePoseEstimator::Impl {
     return median(std::move(distances));
   }
 
-  /// The best fit of several starting points: the direction with a length, no translation at all,
-  /// and the pose of the points alone.
+  /// The best fit of several starting points, and whether it has a rival: the direction with a
+  /// length, no translation at all, and the pose of the points alone.
   std::optional<PoseFit> fit_metric() {
     std::vector<RayPair> with_depth;
     std::ranges::copy_if(pairs_, std::back_inserter(with_depth), &RayPair::has_depth);
@@ -294,13 +307,15 @@ class RelativePoseEstimator::Impl {
       const auto length = length_m(inliers_with_depth(), start);
       if (length) starts.push_back({start.rotation, start.translation * *length});
     }
-    if (const auto pose = pose_of_points(inliers_with_depth())) starts.push_back(*pose);
-    std::optional<PoseFit> best;
+    if (const auto pose = pose_of_points(with_depth)) starts.push_back(*pose);
+    std::vector<PoseFit> fits;
+    fits.reserve(starts.size());
     for (const RigidPose& start : starts) {
-      const PoseFit fit = fit_pose(with_depth, start, FitKind::metric, gate(), kFitRounds);
-      if (!best || fit.cost < best->cost) best = fit;
+      fits.push_back(fit_pose(with_depth, start, FitKind::metric, gate(), kFitRounds));
     }
-    const PoseFit whole = fit_pose(pairs_, best->pose, FitKind::metric, gate(), kFitRounds);
+    const PoseFit& best = *std::ranges::min_element(fits, {}, &PoseFit::cost);
+    has_metric_rival_ = has_rival(fits, best, distance_m(with_depth));
+    const PoseFit whole = fit_pose(pairs_, best.pose, FitKind::metric, gate(), kFitRounds);
     return whole;
   }
 
@@ -320,6 +335,7 @@ class RelativePoseEstimator::Impl {
   Verification found_;
   std::vector<RayPair> pairs_;
   std::vector<RayPair> inliers_;  ///< of the direction
+  bool has_metric_rival_ = false;
   double direction_cost_ = 0;
   std::vector<RigidPose> starts_;  ///< what the directions say, best first
 };
