@@ -3,13 +3,18 @@
 // Small recordings of other libraries; tests/recordings has the larger ones.
 #include "loopbit/recordings.hpp"
 
+#include <array>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
+#include "motion_message.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -86,6 +91,51 @@ TEST_F(RecordingFiles, CutAnywhereGiveErrorsOrFewerFrames) {
       }
     }
   }
+}
+
+/// What is read of a message of the topic, as text.
+std::string read_motion(const recordings::Channel& channel, recordings::Bytes message) {
+  if (recordings::is_camera_info(channel)) {
+    return recordings::read_camera_info(channel, message, false, "It");
+  }
+  std::string text;
+  for (const auto& read : recordings::read_transforms(channel, message, "It")) {
+    text += fmt::format("{} {} {} {}\n", read.time_s, read.parent, read.child,
+                        fmt::join(read.T_parent_child.val, " "));
+  }
+  return text;
+}
+
+/// The first byte of a seed says what the others are, see fuzz/fuzz_motion_message.cpp.
+TEST(MotionMessages, CutAnywhereGiveAnErrorOrTheSame) {
+  constexpr std::array kTypes = {"nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped",
+                                 "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/CameraInfo"};
+  int seeds = 0;
+  for (const auto& entry : fs::directory_iterator(kSeeds / "motion_message")) {
+    SCOPED_TRACE(entry.path());
+    ++seeds;
+    std::ifstream file(entry.path(), std::ios::binary);
+    const std::vector<unsigned char> seed(std::istreambuf_iterator<char>(file), {});
+    ASSERT_GT(seed.size(), 1U);
+    const recordings::Channel channel{
+        .topic = "/topic",
+        .type = kTypes.at(seed[0] & 3U),
+        .encoding = (seed[0] & 4U) != 0 ? recordings::Encoding::ros1 : recordings::Encoding::cdr};
+    const recordings::Bytes message = recordings::Bytes(seed).subspan(1);
+    const std::string whole = read_motion(channel, message);
+    EXPECT_NE(whole, "");
+    std::size_t refused = 0;
+    for (std::size_t size = 0; size < message.size(); ++size) {
+      try {
+        EXPECT_EQ(read_motion(channel, message.first(size)), whole) << size;
+      } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("It "), std::string::npos);
+        ++refused;
+      }
+    }
+    EXPECT_GT(refused, 56U) << "a pose alone has so many bytes";
+  }
+  EXPECT_EQ(seeds, 8);
 }
 
 TEST_F(RecordingFiles, AreToldByName) {

@@ -20,6 +20,7 @@
 #include "bindings.hpp"
 #include "numpy_columns.hpp"
 #include "numpy_image.hpp"
+#include "numpy_matrix.hpp"
 #include "settings.hpp"
 #include "text.hpp"
 
@@ -32,11 +33,12 @@ using Path = std::filesystem::path;
 using Free = py::call_guard<WithoutGil>;
 
 std::unique_ptr<SharedSource> open_shared(const Path& input, int every, int limit,
-                                          int max_megapixels, const std::string& topic) {
+                                          int max_megapixels, const std::string& topic,
+                                          const std::string& odometry_topic) {
   const Sampling sampling{every, limit};
   return std::make_unique<SharedSource>(
-      subsample(open_input(input.string(), topic, max_megapixels), sampling), input.string(),
-      sampling);
+      subsample(open_input(input.string(), topic, max_megapixels, odometry_topic), sampling),
+      input.string(), sampling);
 }
 
 Frame next_frame(SharedSource& source) {
@@ -64,6 +66,13 @@ void bind_frame(py::module_& module) {
           "uint8 or uint16, (h, w), BGR or BGRA; None if unreadable. Not copied.")
       .def_property_readonly("error", text_of(&Frame::error),
                              "Why the image is unreadable; empty if it is readable.")
+      .def_property_readonly(
+          "T_odometry_camera",
+          [](const Frame& self) {
+            return self.T_odometry_camera ? std::optional(square_of(*self.T_odometry_camera))
+                                          : std::nullopt;
+          },
+          "The pose of the camera by the odometry of a recording, metres, shape (4, 4), or None.")
       .def("__repr__", [](const Frame& self) {
         return Text{fmt::format("Frame('{}', {})", self.name,
                                 self.image.empty()
@@ -88,6 +97,14 @@ void bind_topics(py::module_& module) {
       [](const Path& recording) { return read_recording_info(recording.string()).topics; },
       py::arg("recording"), Free(),
       "The topics of a ROS bag (.bag, .db3, or the folder of a ROS 2 bag) or MCAP file, by name.");
+  module.def(
+      "recorded_camera_info",
+      [](const Path& recording, const std::string& topic) {
+        return Text{recorded_camera_info(recording.string(), topic)};
+      },
+      py::arg("recording"), py::arg("topic") = "", Free(),
+      "The calibration of a recording's images, from camera_info beside their topic, as YAML that "
+      "read_cameras() reads from a file. Empty if there is none.");
 }
 
 void bind_source(py::module_& module) {
@@ -114,11 +131,15 @@ void bind_source(py::module_& module) {
       });
   module.def(
       "open_source", &open_shared, py::arg("input"), py::kw_only(), whole("every") = 1,
-      whole("limit") = 0, whole("max_megapixels") = kMaxMegapixels, py::arg("topic") = "", Free(),
+      whole("limit") = 0, whole("max_megapixels") = kMaxMegapixels, py::arg("topic") = "",
+      py::arg("odometry_topic") = "", Free(),
       "Opens a folder of images (natural order), a KITTI odometry, EuRoC or TUM RGB-D "
       "folder, a text file that lists images, an image, a video, a ROS bag or MCAP file, or "
       "'camera:N'. Reads only every N-th frame, and at most limit frames (0 = all). Images above "
-      "max_megapixels are unreadable. topic: of a recording; needed if several have images.");
+      "max_megapixels are unreadable. topic: of a recording; needed if several have images. "
+      "odometry_topic: of a recording, with odometry, poses or /tf: gives each frame the pose of "
+      "the "
+      "camera. /tf_static says where the camera is on the robot.");
   bind_topics(module);
 }
 

@@ -306,6 +306,13 @@ std::vector<CameraModel> read_cameras(const std::string& path) {
   return cameras;
 }
 
+CameraModel parse_camera_info(const std::string& yaml, const std::string& name) {
+  const CameraFile file(name);
+  CameraModel camera = yaml_cameras(file, yaml).front();
+  validate(camera, fmt::format("'{}'", name));
+  return camera;
+}
+
 CameraModel read_camera(const std::string& path, int index) {
   const auto cameras = read_cameras(path);
   if (index >= 0 && index < static_cast<int>(cameras.size())) {

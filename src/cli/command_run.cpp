@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -26,6 +28,7 @@ struct RunFlags {
   SessionFlags session;
   std::string input;
   std::string topic;
+  std::string odometry_topic;
   Sampling sampling;
   int max_megapixels = kMaxMegapixels;
   TruthFlags truth;
@@ -48,8 +51,21 @@ std::string usual_folder(const RunFlags& flags) {
   return folder;
 }
 
-/// The calibration of --camera, or the one in the data set's folder. Throws Error only for the
-/// former.
+/// The calibration in the data set's folder or in the recording, and where it is from. Throws
+/// Error.
+std::pair<std::optional<CameraModel>, std::string> found_camera(const RunFlags& flags) {
+  if (is_recording(flags.input)) {
+    const std::string yaml = recorded_camera_info(flags.input, flags.topic);
+    if (yaml.empty()) return {};
+    return {parse_camera_info(yaml, "camera_info of " + flags.input), flags.input};
+  }
+  const auto found = find_camera(flags.input);
+  if (!found) return {};
+  return {read_camera(found->path, found->index), found->path};
+}
+
+/// The calibration of --camera, or the one in the data set's folder or the recording. Throws Error
+/// only for the former.
 void choose_camera(const RunFlags& flags, SessionFlags& session) {
   if (flags.no_poses) return;
   RunRequest& run = session.run;
@@ -58,16 +74,12 @@ void choose_camera(const RunFlags& flags, SessionFlags& session) {
     run.camera_file = flags.camera;
     return;
   }
-  const auto found = find_camera(flags.input);
-  if (!found) return;
   try {
-    run.camera = read_camera(found->path, found->index);
+    std::tie(run.camera, run.camera_file) = found_camera(flags);
   } catch (const Error& error) {
     tell(fmt::format("loopbit: No relative poses: {}\n", error.what()));
-    return;
   }
-  run.camera_file = found->path;
-  session.found_camera = true;
+  session.found_camera = run.camera.has_value();
 }
 
 int run_command(RunFlags& flags, const Arguments& arguments) {
@@ -76,10 +88,67 @@ int run_command(RunFlags& flags, const Arguments& arguments) {
   run.arguments = arguments;
   run.scoring = flags.truth.scoring;
   run.poses = flags.truth.poses;
+  auto source = open_input(flags.input, flags.topic, flags.max_megapixels, flags.odometry_topic);
   choose_camera(flags, flags.session);
-  return run_session(
-      subsample(open_input(flags.input, flags.topic, flags.max_megapixels), flags.sampling),
-      flags.input, flags.sampling, flags.session);
+  return run_session(subsample(std::move(source), flags.sampling), flags.input, flags.sampling,
+                     flags.session);
+}
+
+/// Adds the flags for camera, depth, stereo and odometry.
+void add_motion_flags(CLI::App& command, RunFlags& flags) {
+  CLI::Option* camera =
+      command
+          .add_option(
+              "--camera", flags.camera,
+              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): measures the "
+              "relative pose of each loop for relative_poses.csv. Default: the one in a "
+              "KITTI or EuRoC folder, camera.yaml in the folder, or camera_info in a recording")
+          ->type_name("FILE");
+  CLI::Option* depth =
+      command
+          .add_option("--depth", flags.session.run.depth,
+                      "Depth images, so that relative poses are in metres: a folder with names "
+                      "like those of the images, or a TUM RGB-D folder with its depth.txt")
+          ->type_name("DIR");
+  command
+      .add_option("--depth-scale", flags.session.run.depth_scale,
+                  "Units per metre of 16-bit depth images; most sensors: 1000")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(number(1e-3, 1e6))
+      ->needs(depth);
+  CLI::Option* odometry =
+      command
+          .add_option(
+              "--odometry", flags.session.run.odometry,
+              "Poses of the camera by odometry (TUM, KITTI, EuRoC, or TUM with covariances), "
+              "matched by time or row; with a camera, relative poses are in metres. --set "
+              "odometry.NAME=VALUE says how fast it drifts")
+          ->type_name("FILE");
+  command
+      .add_option("--odometry-topic", flags.odometry_topic,
+                  "The same from a topic of a recording: odometry, poses, or /tf. /tf_static says "
+                  "where the camera is on the robot")
+      ->type_name("NAME")
+      ->excludes(odometry);
+  CLI::Option* right =
+      command
+          .add_option("--right", flags.session.run.right,
+                      "Images of the right camera of a stereo pair, so that relative poses are in "
+                      "metres: a folder with names like those of the images. Its calibration: in "
+                      "its KITTI or EuRoC folder, or the second one of --camera")
+          ->type_name("DIR")
+          ->excludes(depth);
+  command
+      .add_option("--baseline", flags.session.run.baseline_m,
+                  "Baseline of a rectified stereo pair in metres, in place of a calibration")
+      ->type_name("M")
+      ->check(number(1e-4, 1e4))
+      ->needs(right);
+  command.add_flag("--no-poses", flags.no_poses, "Measure no relative poses")
+      ->excludes(camera)
+      ->excludes(depth)
+      ->excludes(right);
 }
 
 }  // namespace
@@ -111,51 +180,7 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   add_mask_flag(*command, flags->session.run.mask);
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
-  CLI::Option* camera =
-      command
-          ->add_option(
-              "--camera", flags->camera,
-              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): measures the "
-              "relative pose of each loop for relative_poses.csv. Default: the one in a "
-              "KITTI or EuRoC folder, or camera.yaml in the folder")
-          ->type_name("FILE");
-  CLI::Option* depth =
-      command
-          ->add_option("--depth", flags->session.run.depth,
-                       "Depth images, so that relative poses are in metres: a folder with names "
-                       "like those of the images, or a TUM RGB-D folder with its depth.txt")
-          ->type_name("DIR");
-  command
-      ->add_option("--depth-scale", flags->session.run.depth_scale,
-                   "Units per metre of 16-bit depth images; most sensors: 1000")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(number(1e-3, 1e6))
-      ->needs(depth);
-  command
-      ->add_option("--odometry", flags->session.run.odometry,
-                   "Poses of the camera by odometry (TUM, KITTI, EuRoC, or TUM with covariances), "
-                   "matched by time or row; with a camera, relative poses are in metres. --set "
-                   "odometry.NAME=VALUE says how fast it drifts")
-      ->type_name("FILE");
-  CLI::Option* right =
-      command
-          ->add_option("--right", flags->session.run.right,
-                       "Images of the right camera of a stereo pair, so that relative poses are in "
-                       "metres: a folder with names like those of the images. Its calibration: in "
-                       "its KITTI or EuRoC folder, or the second one of --camera")
-          ->type_name("DIR")
-          ->excludes(depth);
-  command
-      ->add_option("--baseline", flags->session.run.baseline_m,
-                   "Baseline of a rectified stereo pair in metres, in place of a calibration")
-      ->type_name("M")
-      ->check(number(1e-4, 1e4))
-      ->needs(right);
-  command->add_flag("--no-poses", flags->no_poses, "Measure no relative poses")
-      ->excludes(camera)
-      ->excludes(depth)
-      ->excludes(right);
+  add_motion_flags(*command, *flags);
   command->footer(list_truth_settings());
   command->callback(
       [flags, &arguments, &exit_code] { exit_code = run_command(*flags, arguments); });

@@ -1,13 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-// Messages: https://docs.ros2.org/latest/api/sensor_msgs; CDR: OMG DDSI-RTPS 2.5, 10.5, and
-// DDS-XTYPES 1.3, 7.4; encodings: sensor_msgs/image_encodings.hpp.
+// Messages: https://docs.ros2.org/latest/api/sensor_msgs; encodings:
+// sensor_msgs/image_encodings.hpp.
 #include "image_message.hpp"
 
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <optional>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -16,60 +15,13 @@
 #include "loopbit/error.hpp"
 #include "loopbit/image_file.hpp"
 
+#include "field_reader.hpp"
+
 namespace loopbit::recordings {
 namespace {
 
 [[noreturn]] void fail(const std::string& thing, const std::string& what) {
   throw Error(ErrorKind::input, fmt::format("{} {}.", thing, what));
-}
-
-/// Reads what the messages consist of. ROS 1 aligns nothing; CDR aligns numbers to their size,
-/// counted from behind its first 4 bytes, and ends strings with a NUL.
-class FieldReader {
- public:
-  static FieldReader ros1(Bytes message) { return {ByteReader(message), false}; }
-
-  /// Nothing if it is no plain CDR, whose second byte tells the order of bytes.
-  static std::optional<FieldReader> cdr(Bytes message) {
-    constexpr std::size_t kHead = 4;
-    constexpr std::array<unsigned, 4> kPlain = {0x00, 0x01, 0x06, 0x07};  // CDR, then CDR 2; BE, LE
-    if (message.size() < kHead || message[0] != 0) return std::nullopt;
-    if (std::ranges::find(kPlain, message[1]) == kPlain.end()) return std::nullopt;
-    const auto order = (message[1] & 1U) != 0 ? std::endian::little : std::endian::big;
-    return FieldReader(ByteReader(message.subspan(kHead), order), true);
-  }
-
-  std::uint8_t byte() { return reader_.number<std::uint8_t>(); }
-
-  std::uint32_t number() {
-    if (is_cdr_) reader_.align(sizeof(std::uint32_t));
-    return reader_.number<std::uint32_t>();
-  }
-
-  Bytes counted_bytes() { return reader_.bytes(number()); }
-
-  std::string text() {
-    Bytes characters = counted_bytes();
-    if (is_cdr_ && !characters.empty()) characters = characters.first(characters.size() - 1);
-    return {characters.begin(), characters.end()};
-  }
-
-  [[nodiscard]] bool ok() const { return reader_.ok(); }
-
- private:
-  FieldReader(ByteReader reader, bool is_cdr) : reader_(reader), is_cdr_(is_cdr) {}
-
-  ByteReader reader_;
-  bool is_cdr_;
-};
-
-/// In ROS 1 the header begins with a number, and seconds have no sign.
-void read_header(FieldReader& fields, bool is_ros1, ImageMessage& message) {
-  if (is_ros1) fields.number();
-  const std::uint32_t seconds = fields.number();
-  message.stamp_s = is_ros1 ? std::int64_t{seconds} : std::bit_cast<std::int32_t>(seconds);
-  message.stamp_ns = fields.number();
-  fields.text();  // the name of the camera's frame
 }
 
 bool is_compressed_type(std::string_view type) {
@@ -180,23 +132,21 @@ bool is_image(const Channel& channel) {
 }
 
 ImageMessage read_image_message(const Channel& channel, Bytes message, const std::string& thing) {
-  const bool is_ros1 = channel.encoding == Encoding::ros1;
-  auto fields = is_ros1 ? FieldReader::ros1(message) : FieldReader::cdr(message);
-  if (!fields) fail(thing, "is not encoded in plain CDR: record it again");
+  FieldReader fields(channel, message, thing);
   ImageMessage image;
+  image.header = fields.header();
   image.is_compressed = is_compressed_type(channel.type);
-  read_header(*fields, is_ros1, image);
   if (image.is_compressed) {
-    image.encoding = fields->text();
+    image.encoding = fields.text();
   } else {
-    image.height = fields->number();
-    image.width = fields->number();
-    image.encoding = fields->text();
-    image.is_big_endian = fields->byte() != 0;
-    image.step = fields->number();
+    image.height = fields.number();
+    image.width = fields.number();
+    image.encoding = fields.text();
+    image.is_big_endian = fields.byte() != 0;
+    image.step = fields.number();
   }
-  image.data = fields->counted_bytes();
-  if (!fields->ok()) fail(thing, fmt::format("is cut off after {} bytes", message.size()));
+  image.data = fields.counted_bytes();
+  fields.check_whole(thing);
   return image;
 }
 

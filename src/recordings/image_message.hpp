@@ -8,14 +8,13 @@
 
 #include <opencv2/core.hpp>
 
-#include "recording_file.hpp"
+#include "field_reader.hpp"
 
 namespace loopbit::recordings {
 
 /// sensor_msgs Image or CompressedImage, of ROS 1 or ROS 2. Refers to the bytes it was read from.
 struct ImageMessage {
-  std::int64_t stamp_s = 0;
-  std::uint32_t stamp_ns = 0;  ///< beside the seconds
+  Header header;
   bool is_compressed = false;
   std::string encoding;  ///< such as "bgr8"; "jpeg" and the like of a compressed image
   std::uint32_t width = 0;

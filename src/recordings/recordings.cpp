@@ -18,7 +18,8 @@
 
 #include "compression.hpp"
 #include "image_message.hpp"
-#include "recording_file.hpp"
+#include "motion_message.hpp"
+#include "recorded_motion.hpp"
 
 namespace loopbit {
 
@@ -147,28 +148,15 @@ RecordingInfo read_info(const fs::path& input, const std::vector<fs::path>& file
   return info;
 }
 
-/// "/a (type, N messages), /b (...)", the first of them.
-std::string list(const std::vector<Topic>& topics, bool with_images) {
-  constexpr std::size_t kMost = 20;
-  std::vector<std::string> named;
-  for (const Topic& topic : topics) {
-    if (with_images && !topic.has_images) continue;
-    named.push_back(fmt::format("{} ({}, {} messages)", topic.name, topic.type, topic.messages));
-  }
-  if (named.empty()) return "none";
-  const std::size_t more = named.size() - std::min(named.size(), kMost);
-  named.resize(named.size() - more);
-  return fmt::format("{}{}", fmt::join(named, ", "), more ? fmt::format(" and {} more", more) : "");
-}
-
 [[noreturn]] void throw_bad_topic(ErrorKind kind, const std::string& input,
                                   const std::string& what) {
   throw Error(kind, fmt::format("Recording '{}' {}.", input, what));
 }
 
 /// The topic to read.
-const Topic& choose_topic(const std::string& input, const RecordingInfo& info,
-                          const std::string& name) {
+const Topic& choose_topic(const Recording& recording, const std::string& name) {
+  const auto& [input, files, info] = recording;
+  const auto is_any = [](const Topic&) { return true; };
   const auto has_images = [](const Topic& t) { return t.has_images && t.messages > 0; };
   if (name.empty()) {
     const auto first = std::ranges::find_if(info.topics, has_images);
@@ -176,45 +164,35 @@ const Topic& choose_topic(const std::string& input, const RecordingInfo& info,
       throw_bad_topic(ErrorKind::input, input,
                       fmt::format("has no images; record a topic of the type sensor_msgs Image or "
                                   "CompressedImage. Its topics: {}",
-                                  list(info.topics, false)));
+                                  list(info.topics, is_any)));
     }
     if (std::ranges::count_if(info.topics, has_images) == 1) return *first;
     throw_bad_topic(ErrorKind::option, input,
                     fmt::format("has several topics with images; choose one as topic: {}",
-                                list(info.topics, true)));
+                                list(info.topics, has_images)));
   }
   const auto topic = std::ranges::find(info.topics, name, &Topic::name);
   if (topic == info.topics.end()) {
     throw_bad_topic(ErrorKind::option, input,
                     fmt::format("has no topic '{}'. Its topics with images: {}; others: 'loopbit "
                                 "topics' lists them",
-                                name, list(info.topics, true)));
+                                name, list(info.topics, has_images)));
   }
   if (has_images(*topic)) return *topic;
   throw_bad_topic(ErrorKind::option, input,
                   fmt::format("has no images on topic '{}' ({}, {} messages). Its topics with "
                               "images: {}",
-                              name, topic->type, topic->messages, list(info.topics, true)));
+                              name, topic->type, topic->messages, list(info.topics, has_images)));
 }
 
-/// Of a camera's clock since 1970, or since it was switched on.
-struct Stamp {
-  std::int64_t seconds = 0;
-  std::uint32_t nanoseconds = 0;
-
-  static Stamp of(std::uint64_t time_ns) {
-    return {static_cast<std::int64_t>(time_ns / kSecond_ns),
-            static_cast<std::uint32_t>(time_ns % kSecond_ns)};
-  }
-
-  [[nodiscard]] bool is_set() const {
-    return (seconds != 0 || nanoseconds != 0) && nanoseconds < kSecond_ns;
-  }
-  [[nodiscard]] std::string name() const { return fmt::format("{}.{:09}", seconds, nanoseconds); }
-  [[nodiscard]] double in_seconds() const {
-    return static_cast<double>(seconds) + static_cast<double>(nanoseconds) / kSecond_ns;
-  }
-};
+/// The bytes of a message; `unpacked` holds them if it was compressed. Throws Error (kind input) if
+/// it cannot be unpacked; `thing` begins the sentence.
+Bytes unpack(const Message& message, std::vector<unsigned char>& unpacked,
+             const std::string& thing) {
+  if (message.channel->encoding != Encoding::cdr || !is_zstd(message.data)) return message.data;
+  if (decompress_zstd(message.data, kMaxMessageBytes, unpacked)) return unpacked;
+  throw Error(ErrorKind::input, thing + " is damaged or too large: leave it out.");
+}
 
 /// Sets `frame` to the image of `message`, or to the reason why it has none. `input`: its
 /// recording.
@@ -226,16 +204,9 @@ void read_frame(const Message& message, const std::string& input, int max_megapi
   const std::string thing = fmt::format("An image of '{}' on {}, recorded at {},", input,
                                         message.channel->topic, stamp.name());
   try {
-    Bytes data = message.data;
-    if (message.channel->encoding == Encoding::cdr && is_zstd(data)) {
-      if (!decompress_zstd(data, kMaxMessageBytes, unpacked)) {
-        throw Error(ErrorKind::input, thing + " is damaged or too large: leave it out.");
-      }
-      data = unpacked;
-    }
-    const ImageMessage image = read_image_message(*message.channel, data, thing);
-    const Stamp own{image.stamp_s, image.stamp_ns};
-    if (own.is_set()) stamp = own;
+    const ImageMessage image =
+        read_image_message(*message.channel, unpack(message, unpacked, thing), thing);
+    if (image.header.stamp.is_set()) stamp = image.header.stamp;
     frame = Frame{stamp.name(), stamp.in_seconds(), {}, {}};
     frame.image = decode(image, max_megapixels, thing);
   } catch (const Error& error) {
@@ -245,19 +216,24 @@ void read_frame(const Message& message, const std::string& input, int max_megapi
 
 class RecordingSource final : public ImageSource {
  public:
-  RecordingSource(std::string input, std::vector<fs::path> files, const Topic& topic,
-                  const RecordingInfo& info, int max_megapixels)
-      : input_(std::move(input)),
-        files_(std::move(files)),
+  RecordingSource(const Recording& recording, const Topic& topic, const std::string& odometry_topic,
+                  int max_megapixels)
+      : input_(recording.input),
+        files_(recording.files),
         topic_(topic),
-        description_(fmt::format("{}, {}", info.description, topic.name)),
-        is_whole_(info.damage.empty()),
-        max_megapixels_(max_megapixels) {}
+        description_(fmt::format("{}, {}", recording.info.description, topic.name)),
+        is_whole_(recording.info.damage.empty()),
+        max_megapixels_(max_megapixels) {
+    if (odometry_topic.empty()) return;
+    motion_.emplace(recording, odometry_topic, topic.name);
+    description_ += fmt::format(", odometry {}", odometry_topic);
+  }
 
   bool next(Frame& frame) override {
     Message message;
     if (!next_message(message)) return false;
     read_frame(message, input_, max_megapixels_, frame);
+    if (motion_) frame.T_odometry_camera = motion_->at(frame.timestamp_s.value());
     return true;
   }
 
@@ -297,6 +273,7 @@ class RecordingSource final : public ImageSource {
   std::string description_;
   bool is_whole_;
   int max_megapixels_;
+  std::optional<RecordedMotion> motion_;
   std::size_t position_ = 0;
   std::unique_ptr<RecordingFile> file_;  ///< the current one, once it is read
   std::string damage_;
@@ -312,7 +289,53 @@ std::vector<fs::path> required_files(const std::string& input) {
                           input));
 }
 
+Recording open(const std::string& input) {
+  Recording recording{.input = input, .files = required_files(input), .info = {}};
+  recording.info = read_info(input, recording.files);
+  return recording;
+}
+
+/// The topic of the calibration that belongs to the images of a topic, by ROS' custom: camera_info
+/// beside it. That of `/camera/image_raw/compressed` is beside `image_raw`.
+const Topic* find_camera_info(const RecordingInfo& info, const std::string& images) {
+  std::string folder = images;
+  for (int level = 0; level < 2; ++level) {
+    folder.erase(std::min(folder.size(), folder.rfind('/')));
+    const auto topic = std::ranges::find(info.topics, folder + "/camera_info", &Topic::name);
+    if (topic != info.topics.end()) return &*topic;
+  }
+  return nullptr;
+}
+
 }  // namespace
+
+void for_each_message(const Recording& recording, const std::string& topic,
+                      const ReadMessage& read) {
+  std::vector<unsigned char> unpacked;
+  for (const fs::path& path : recording.files) {
+    const auto file = open_file(path, topic);
+    for (Message message; file->next(message);) {
+      const std::string thing =
+          fmt::format("A message of '{}' on {}, recorded at {},", recording.input, topic,
+                      Stamp::of(message.time_ns).name());
+      if (!read(message, unpack(message, unpacked, thing), thing)) return;
+    }
+  }
+}
+
+std::string list(const std::vector<Topic>& topics,
+                 const std::function<bool(const Topic&)>& is_listed) {
+  constexpr std::size_t kMost = 20;
+  std::vector<std::string> named;
+  for (const Topic& topic : topics) {
+    if (!is_listed(topic)) continue;
+    named.push_back(fmt::format("{} ({}, {} messages)", topic.name, topic.type, topic.messages));
+  }
+  if (named.empty()) return "none";
+  const std::size_t more = named.size() - std::min(named.size(), kMost);
+  named.resize(named.size() - more);
+  return fmt::format("{}{}", fmt::join(named, ", "), more ? fmt::format(" and {} more", more) : "");
+}
 
 std::string cut_off_after(std::uint64_t bytes) {
   return fmt::format("is cut off after {} bytes, and its last messages are missing", bytes);
@@ -333,23 +356,44 @@ RecordingInfo read_recording_info(const std::string& input) {
 }
 
 std::unique_ptr<ImageSource> open_recording(const std::string& input, const std::string& topic,
-                                            int max_megapixels) {
+                                            int max_megapixels, const std::string& odometry_topic) {
   images::check_max_megapixels(max_megapixels);
-  std::vector<std::filesystem::path> files = recordings::required_files(input);
-  const RecordingInfo info = recordings::read_info(input, files);
+  const recordings::Recording recording = recordings::open(input);
   return std::make_unique<recordings::RecordingSource>(
-      input, std::move(files), recordings::choose_topic(input, info, topic), info, max_megapixels);
+      recording, recordings::choose_topic(recording, topic), odometry_topic, max_megapixels);
 }
 
 std::unique_ptr<ImageSource> open_input(const std::string& input, const std::string& topic,
-                                        int max_megapixels) {
-  if (is_recording(input)) return open_recording(input, topic, max_megapixels);
-  if (topic.empty()) return open_source(input, max_megapixels);
-  throw Error(
-      ErrorKind::option,
-      fmt::format("topic is '{}', but '{}' is no recording; leave topic out, or give a file "
-                  ".bag, .db3 or .mcap, or the folder of a ROS 2 bag.",
-                  topic, input));
+                                        int max_megapixels, const std::string& odometry_topic) {
+  if (is_recording(input)) return open_recording(input, topic, max_megapixels, odometry_topic);
+  for (const auto& [name, value] :
+       {std::pair("topic", topic), std::pair("odometry_topic", odometry_topic)}) {
+    if (value.empty()) continue;
+    throw Error(
+        ErrorKind::option,
+        fmt::format("{} is '{}', but '{}' is no recording; leave {} out, or give a file .bag, .db3 "
+                    "or .mcap, or the folder of a ROS 2 bag.",
+                    name, value, input, name));
+  }
+  return open_source(input, max_megapixels);
+}
+
+std::string recorded_camera_info(const std::string& input, const std::string& topic) {
+  const recordings::Recording recording = recordings::open(input);
+  const std::string images = recordings::choose_topic(recording, topic).name;
+  const Topic* const info = recordings::find_camera_info(recording.info, images);
+  if (info == nullptr) return {};
+  const std::string_view last = std::string_view(images).substr(info->name.rfind('/'));
+  const bool is_rectified = last.find("rect") != std::string_view::npos;
+  std::string yaml;
+  recordings::for_each_message(
+      recording, info->name,
+      [&](const recordings::Message& message, recordings::Bytes data, const std::string& thing) {
+        if (!recordings::is_camera_info(*message.channel)) return true;
+        yaml = recordings::read_camera_info(*message.channel, data, is_rectified, thing);
+        return false;
+      });
+  return yaml;
 }
 
 }  // namespace loopbit

@@ -30,7 +30,13 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
     report(detector.skip(frame.timestamp_s, pose), frame);
   };
   const auto detect = [&](const Frame& frame) {
-    if (odometry) pose = odometry(frame);
+    if (odometry) {
+      pose = odometry(frame);
+    } else if (frame.T_odometry_camera) {
+      pose = OdometryPose{*frame.T_odometry_camera};
+    } else {
+      pose.reset();
+    }
     if (!frame.error.empty()) return leave_out(frame, frame.error);
     if (is_first) check_time(frame, detector.options());
     Evidence evidence;

@@ -218,7 +218,7 @@ def test_frames_that_nobody_knows():
 RENAMED = {"tolerance": "tolerance_frames", "truth_set": "poses", "truth_views": "views", "baseline": "baseline_m",
            "truth_variable": "variable", "poses": "positions_m", "no_report": "evidence"}
 OF_OPTIONS = {"preset", "config", "set"}
-OF_SOURCE = {"every", "limit", "max_megapixels", "topic"}
+OF_SOURCE = {"every", "limit", "max_megapixels", "topic", "odometry_topic"}
 OF_THE_COMMAND = {"help", "threads", "pictures_mb", "open", "json", "quiet", "no_poses", "live",
                   "live_address", "mcap_out"}
 

@@ -5,8 +5,9 @@
 //   write.mjs NODE_MODULES SPECS.json
 //
 // SPECS.json is a list of { out, encoding: "ros2", "ros2be" or "ros1", container: "mcap" or "messages",
-// compression, chunked, messages: [{ topic, type, stamp: [s, ns], time_ns, file, ... }] }. "messages" is
-// a file of messages alone, each after its length, for other containers.
+// compression, chunked, messages: [{ topic, type, stamp: [s, ns], time_ns, file, ... }] }. A message of
+// another type than the two of images has its fields in place of a file. "messages" is a file of messages
+// alone, each after its length, for other containers.
 import fs from "node:fs";
 import { createRequire } from "node:module";
 import path from "node:path";
@@ -35,7 +36,11 @@ function definitions(all, name) {
   return found;
 }
 
+/** The name of a type without "msg/"; images are named without their package. */
+const typeOf = (message) => (message.type.includes("/") ? message.type : `sensor_msgs/${message.type}`);
+
 function fieldsOf(message) {
+  if (message.fields) return message.fields;
   const [sec, nsec] = message.stamp;
   const data = new Uint8Array(fs.readFileSync(message.file));
   const header = { seq: 7, stamp: { sec, nsec, nanosec: nsec }, frame_id: "camera" };
@@ -57,14 +62,14 @@ function bigEndian(message) {
 function serializer(spec) {
   if (spec.encoding === "ros2be") return bigEndian;
   const writers = {};
-  for (const type of ["Image", "CompressedImage"]) {
-    const name = `sensor_msgs/${type}`;
-    writers[type] =
+  return (message) => {
+    const name = typeOf(message);
+    writers[name] ??=
       spec.encoding === "ros1"
         ? new Ros1Writer(definitions(ros1, name))
         : new Ros2Writer(definitions(ros2humble, name));
-  }
-  return (message) => writers[message.type].writeMessage(fieldsOf(message));
+    return writers[name].writeMessage(fieldsOf(message));
+  };
 }
 
 class Output {
@@ -99,11 +104,11 @@ async function writeMcap(spec, serialize) {
   await writer.start({ profile: spec.encoding === "ros1" ? "ros1" : "ros2", library: "a test" });
   const channels = {};
   for (const [sequence, message] of spec.messages.entries()) {
-    const { topic, type } = message;
+    const { topic } = message;
     if (!(topic in channels)) {
-      const infix = spec.encoding === "ros1" ? "" : "msg/";
+      const name = typeOf(message);
       const schemaId = await writer.registerSchema({
-        name: `sensor_msgs/${infix}${type}`,
+        name: spec.encoding === "ros1" ? name : name.replace("/", "/msg/"),
         encoding: spec.encoding === "ros1" ? "ros1msg" : "ros2msg",
         data: new Uint8Array(),
       });

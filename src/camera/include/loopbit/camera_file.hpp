@@ -21,6 +21,10 @@ namespace loopbit {
 /// has another model.
 std::vector<CameraModel> read_cameras(const std::string& path);
 
+/// The camera of a `camera_info` in YAML, such as recorded_camera_info() gives. Throws Error as
+/// read_cameras(); `name` is that of its file or topic.
+CameraModel parse_camera_info(const std::string& yaml, const std::string& name);
+
 /// The camera number `index` of the file, from 0. Throws Error (kind input) if there are fewer.
 CameraModel read_camera(const std::string& path, int index = 0);
 

@@ -17,6 +17,8 @@ struct Frame {
   std::optional<double> timestamp_s;  ///< seconds, if the data set has times; see open_source
   cv::Mat image;                      ///< 8- or 16-bit, grey, BGR or BGRA; empty if unreadable
   std::string error;  ///< empty, or a sentence that says why the image is unreadable
+  /// x_odometry = T_odometry_camera x_camera, in metres, by the odometry of a recording.
+  std::optional<cv::Matx44d> T_odometry_camera = std::nullopt;
 };
 
 /// A sequence of images, read in order. Not thread-safe; one reader at a time.

@@ -51,15 +51,33 @@ RecordingInfo read_recording_info(const std::string& input);
 /// is cut off or lacks its index is read as far as it goes; early_end() then tells. Damaged chunks
 /// are left out, and told there, too.
 ///
-/// Throws Error: kind input if the recording cannot be read, or has no images on any topic or on
-/// `topic`; kind option if `max_megapixels` is less than 1, if there is no such topic, or `topic`
-/// is empty and several have images. The message then lists them.
+/// `odometry_topic`: if not empty, gives each frame the pose of the camera that is nearest in time
+/// (Frame::T_odometry_camera), from messages nav_msgs Odometry, tf2_msgs TFMessage, or
+/// geometry_msgs PoseStamped, PoseWithCovarianceStamped or TransformStamped. Where the camera is on
+/// the robot comes from /tf_static, or /tf if that does not move there. Of the frames of TF, those
+/// from the camera up to `odom` count, or up to the root. A pose without a child frame is that of
+/// the camera. This reads the recording two or three times before the first frame, and takes 140
+/// bytes per message.
+///
+/// Throws Error: kind input if the recording cannot be read, has no images on any topic or on
+/// `topic`, or does not say where the camera is on the robot; kind option if `max_megapixels` is
+/// less than 1, if there is no such topic, or `topic` is empty and several have images. The message
+/// then lists them.
 std::unique_ptr<ImageSource> open_recording(const std::string& input, const std::string& topic = {},
-                                            int max_megapixels = kMaxMegapixels);
+                                            int max_megapixels = kMaxMegapixels,
+                                            const std::string& odometry_topic = {});
 
 /// open_recording() for a recording, otherwise open_source(). Throws Error as they do, and kind
 /// option if a topic is given, but `input` is no recording.
 std::unique_ptr<ImageSource> open_input(const std::string& input, const std::string& topic = {},
-                                        int max_megapixels = kMaxMegapixels);
+                                        int max_megapixels = kMaxMegapixels,
+                                        const std::string& odometry_topic = {});
+
+/// The calibration of the camera whose images open_recording() reads: the first sensor_msgs
+/// CameraInfo on `camera_info` beside their topic, as the YAML of ROS' camera_calibration, which
+/// read_cameras() reads. Its region of interest and binning are applied; images on a topic with
+/// "rect" in its name have no distortion. Empty if there is none, or the camera is not calibrated.
+/// Throws Error as open_recording(), and kind input if the message is damaged.
+std::string recorded_camera_info(const std::string& input, const std::string& topic = {});
 
 }  // namespace loopbit
