@@ -20,7 +20,9 @@
 #include "loopbit/rigid_motion.hpp"
 
 #include "../bench/synthetic_graph.hpp"
+#include "path_covariance.hpp"
 #include "pose_problem.hpp"
+#include "relaxed_poses.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -320,6 +322,70 @@ TEST_P(WrongLoopsTest, AreRejected) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Shares, WrongLoopsTest, testing::Values(0, 0.1, 0.3, 0.5));
+
+/// Drift of 30 degrees, and most wrong loops within its reach.
+TEST(LoopGraphTest, LongDriveIsSolvedFromRightLoops) {
+  const SyntheticGraph synthetic = bench::make_synthetic_graph(
+      {.keyframes = 5000, .loops = 1000, .wrong_share = 0.2, .blocks = 14});
+  LoopGraph graph = graph_of(synthetic);
+  graph.solve();
+  const Judged result = judged(graph, synthetic);
+  EXPECT_EQ(result.wrong_kept, 0);
+  EXPECT_EQ(result.right_lost, 0);
+  EXPECT_LT(result.error_m, 1);
+  EXPECT_GT(bench::trajectory_error_m(bench::dead_reckoning(synthetic), synthetic), 10);
+}
+
+/// Loops that no other supports are kept as well.
+TEST(LoopGraphTest, LoneLoopsAreKept) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const SyntheticGraph synthetic = bench::make_synthetic_graph(
+        {.keyframes = 1000, .loops = 10, .wrong_share = 0.5, .blocks = 5, .seed = seed});
+    LoopGraph graph = graph_of(synthetic);
+    graph.solve();
+    EXPECT_EQ(judged(graph, synthetic).wrong_kept, 0) << seed;
+    EXPECT_LE(judged(graph, synthetic).right_lost, 0.1) << seed;
+  }
+}
+
+TEST(LoopGraphTest, RelaxationOfExactMotionsIsExact) {
+  const SyntheticGraph synthetic =
+      bench::make_synthetic_graph({.keyframes = 50, .loops = 20, .blocks = 2});
+  const auto truth = [&](int k) { return synthetic.truth[static_cast<std::size_t>(k)]; };
+  std::vector<graph::WeighedMotion> motions;
+  const auto add = [&](int from, int to, double weight) {
+    const cv::Matx44d T = rigid::inverse(truth(from)) * truth(to);
+    motions.push_back({from, to, graph::pose_of(T), weight, 2 * weight});
+  };
+  for (int k = 1; k < 50; ++k) add(k - 1, k, 100);
+  add(40, 3, 1);
+  const std::array fixed{0};
+  const auto poses = graph::relaxed_poses(50, motions, fixed);
+  for (int k = 0; k < 50; ++k) {
+    const cv::Matx44d expected = rigid::inverse(truth(0)) * truth(k);
+    EXPECT_LT(cv::norm(graph::matrix_of(poses[static_cast<std::size_t>(k)]) - expected), 1e-6) << k;
+  }
+}
+
+/// Along a chain, the drift of odometry; over a short cut, less.
+TEST(LoopGraphTest, PathCovarianceTakesTheMostCertainPath) {
+  std::vector<graph::Pose> poses;
+  std::vector<graph::WideLoop> motions;
+  const graph::Matrix6d step = graph::eigen_of(diagonal(0.1, 0.01));
+  for (int k = 0; k <= 10; ++k) poses.push_back(graph::pose_of(pose_at(0, k, 0)));
+  for (int k = 0; k < 10; ++k) motions.push_back({k, k + 1, graph::kIdentity, step});
+  const auto chain = graph::PathCovariance(poses, motions).between(2, 7);
+  ASSERT_TRUE(chain);
+  EXPECT_NEAR((*chain)(2, 2), 5 * 0.01, 1e-12);
+  // x of a step back by n metres moves by n times its rotation.
+  EXPECT_NEAR((*chain)(0, 0), 5 * 0.01 + 1e-4 * (1 + 4 + 9 + 16), 1e-12);
+  motions.push_back({1, 8, graph::kIdentity, step});
+  const auto cut = graph::PathCovariance(poses, motions).between(7, 2);
+  ASSERT_TRUE(cut);
+  EXPECT_NEAR((*cut)(2, 2), 3 * 0.01, 1e-12);
+  poses.push_back(graph::kIdentity);
+  EXPECT_FALSE(graph::PathCovariance(poses, motions).between(2, 11));
+}
 
 TEST(LoopGraphTest, EvidenceNamesTheReason) {
   const auto straight = [](LoopGraph& graph, int steps) {

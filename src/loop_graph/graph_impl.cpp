@@ -4,11 +4,12 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <map>
 #include <numeric>
 #include <utility>
 
+#include "path_covariance.hpp"
 #include "pose_problem.hpp"
+#include "relaxed_poses.hpp"
 #include "robust_solve.hpp"
 
 namespace loopbit {
@@ -112,8 +113,9 @@ void GraphImpl::solve() {
   reject_unreachable();
   // What most loops nearby contradict.
   reject_inconsistent();
-  // Everything else, with a robust loss.
-  start_from_odometry();
+  // What loops that support each other make impossible; everything else with a robust loss.
+  start_from_relaxation();
+  reject_improbable();
   solve_kept();
   // Of loops that only others contradicted, those that fit.
   keep_what_fits();
@@ -133,7 +135,9 @@ void GraphImpl::reject_unreachable() {
 }
 
 void GraphImpl::reject_inconsistent() {
+  constexpr int kSupport = 2;
   const std::vector<std::size_t> reachable = of_verdict(LoopVerdict::kept);
+  is_supported_.assign(loops_.size(), false);
   std::vector<graph::WideLoop> wide;
   wide.reserve(reachable.size());
   for (const std::size_t i : reachable) wide.push_back(wide_[i]);
@@ -143,45 +147,65 @@ void GraphImpl::reject_inconsistent() {
     JudgedLoop& loop = loops_[reachable[k]];
     loop.compared = agreements[k].compared;
     loop.agreeing = agreements[k].agreeing;
+    is_supported_[reachable[k]] = agreements[k].supporting >= kSupport;
     if (!agreements[k].is_consistent) loop.verdict = LoopVerdict::inconsistent;
   }
 }
 
-void GraphImpl::start_from_odometry() {
-  for (std::size_t i = 0; i < poses_.size(); ++i) poses_[i] = keyframes_[i].reckoned;
-  // A chain is moved to where the loop says that has most others on its side.
-  std::vector<std::size_t> kept = of_verdict(LoopVerdict::kept);
-  std::ranges::stable_sort(kept, std::greater{}, [&](std::size_t i) { return loops_[i].agreeing; });
-  Joined placed(keyframes_.size());
-  std::map<int, Pose> T_world_chain;
-  const auto chain_of = [&](int keyframe) { return keyframes_[index(keyframe)].chain; };
-  const auto place_of = [&](int chain) {
-    const auto found = T_world_chain.find(chain);
-    return found == T_world_chain.end() ? graph::kIdentity : found->second;
+void GraphImpl::start_from_relaxation() {
+  // A loop that no other supports must not bend the graph yet, but may be all that joins its parts.
+  constexpr double kUnsupported = 1e-6;
+  std::vector<graph::WeighedMotion> motions;
+  const auto add = [&](int from, int to, const Pose& motion, const graph::Matrix6d& covariance,
+                       double trust) {
+    motions.push_back({from, to, motion, trust * 3 / covariance.bottomRightCorner<3, 3>().trace(),
+                       trust * 3 / covariance.topLeftCorner<3, 3>().trace()});
   };
-  for (const std::size_t i : kept) {
-    const int match = placed.root(chain_of(edges_[i].from));
-    const int query = placed.root(chain_of(edges_[i].to));
-    if (match == query) continue;
-    // All chains joined so far to that of the larger number move together.
-    const auto at = [&](int keyframe) {
-      return graph::times(place_of(chain_of(keyframe)), keyframes_[index(keyframe)].reckoned);
-    };
-    const Pose& loop = wide_[i].T_match_query;
-    const Pose goal = match < query ? graph::times(at(edges_[i].from), loop)
-                                    : graph::times(at(edges_[i].to), graph::inverse(loop));
-    const Pose now = at(match < query ? edges_[i].to : edges_[i].from);
-    const Pose move = graph::times(goal, graph::inverse(now));
-    for (const Keyframe& keyframe : keyframes_) {
-      const bool is_first = !keyframe.odometry;
-      if (!is_first || placed.root(keyframe.chain) != std::max(match, query)) continue;
-      T_world_chain[keyframe.chain] = graph::times(move, place_of(keyframe.chain));
-    }
-    placed.join(match, query);
+  for (const Keyframe& keyframe : keyframes_) {
+    if (!keyframe.odometry) continue;
+    const Edge& edge = *keyframe.odometry;
+    add(edge.from, edge.to, edge.measured, edge.information.inverse(), 1);
   }
-  for (std::size_t i = 0; i < poses_.size(); ++i) {
-    const auto found = T_world_chain.find(keyframes_[i].chain);
-    if (found != T_world_chain.end()) poses_[i] = graph::times(found->second, poses_[i]);
+  for (const std::size_t i : of_verdict(LoopVerdict::kept)) {
+    const graph::WideLoop& loop = wide_[i];
+    add(loop.match, loop.query, loop.T_match_query, loop.covariance,
+        is_supported_[i] ? 1 : kUnsupported);
+  }
+  poses_ = graph::relaxed_poses(static_cast<int>(keyframes_.size()), motions, roots());
+}
+
+/// Solves the loops that others support, and tests the others against that solution: as
+/// reject_unreachable() does, but drift counts only to the nearest loops.
+void GraphImpl::reject_improbable() {
+  constexpr int kIterations = 12;
+  const std::vector<std::size_t> kept = of_verdict(LoopVerdict::kept);
+  const auto is_supported = [&](std::size_t i) { return is_supported_[i]; };
+  if (std::ranges::none_of(kept, is_supported) || std::ranges::all_of(kept, is_supported)) return;
+  graph::PoseProblem problem(poses_, options_.seen_within_m);
+  std::vector<graph::WideLoop> motions;
+  for (const Keyframe& keyframe : keyframes_) {
+    if (!keyframe.odometry) continue;
+    problem.add(*keyframe.odometry);
+    motions.push_back(graph::wide_loop(*keyframe.odometry, options_.seen_within_m));
+  }
+  for (const std::size_t i : kept) {
+    if (!is_supported_[i]) continue;
+    problem.add(edges_[i]);
+    motions.push_back(wide_[i]);
+  }
+  for (const Keyframe& keyframe : keyframes_) {
+    if (!keyframe.odometry) problem.fix(keyframe.chain);
+  }
+  problem.solve(kIterations);
+  const graph::PathCovariance known(poses_, motions);
+  const double limit = graph::chi2_limit(options_.confidence, 6);
+  for (const std::size_t i : kept) {
+    const graph::WideLoop& loop = wide_[i];
+    if (is_supported_[i] || chi2(i) <= loops_[i].limit) continue;
+    const auto covariance = known.between(loop.match, loop.query);
+    if (!covariance) continue;
+    const Pose T = graph::between(poses_[index(loop.match)], poses_[index(loop.query)]);
+    if (graph::loop_chi2(loop, {T, *covariance}) > limit) loops_[i].verdict = LoopVerdict::outlier;
   }
 }
 
@@ -284,7 +308,7 @@ bool GraphImpl::confirm_waiting_loops() {
       if (verdict != LoopVerdict::undecided && verdict != LoopVerdict::kept) continue;
       if (!graph::are_comparable(keyframes_, wide_[i], wide_[other])) continue;
       ++loops_[i].compared;
-      if (graph::pair_chi2(keyframes_, wide_[other], wide_[i]) > limit) continue;
+      if (graph::cycle_of(keyframes_, wide_[other], wide_[i]).chi2 > limit) continue;
       ++loops_[i].agreeing;
       any = any || verdict == LoopVerdict::undecided;
       loops_[other].verdict = loops_[i].verdict = LoopVerdict::kept;

@@ -48,7 +48,8 @@ class GraphImpl {
   // The steps of solve().
   void reject_unreachable();
   void reject_inconsistent();
-  void start_from_odometry();
+  void start_from_relaxation();
+  void reject_improbable();
   void solve_kept();
   void keep_what_fits();
 
@@ -68,6 +69,7 @@ class GraphImpl {
   std::vector<JudgedLoop> loops_;
   std::vector<graph::Edge> edges_;     ///< of loops
   std::vector<graph::WideLoop> wide_;  ///< of loops
+  std::vector<bool> is_supported_;     ///< by other loops, in solve()
   std::size_t judged_ = 0;             ///< loops that update() has seen
   int last_kept_query_ = 0;            ///< where update() solved loops last
 };

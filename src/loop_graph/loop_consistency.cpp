@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <numeric>
 #include <set>
 #include <tuple>
@@ -15,6 +16,10 @@ namespace {
 
 const Keyframe& at(const std::vector<Keyframe>& keyframes, int keyframe) {
   return keyframes[static_cast<std::size_t>(keyframe)];
+}
+
+bool are_joined(const std::vector<Keyframe>& keyframes, const WideLoop& loop) {
+  return at(keyframes, loop.match).chain == at(keyframes, loop.query).chain;
 }
 
 /// The small motion that is `error`.
@@ -30,13 +35,27 @@ double mahalanobis(const Pose& error, const Matrix6d& covariance) {
   return motion.dot(covariance.ldlt().solve(motion));
 }
 
-/// Who agrees with whom, both ways.
-struct Comparisons {
-  std::vector<std::vector<std::pair<int, bool>>> of_loop;
+double position_variance(const Matrix6d& covariance) {
+  return covariance.topLeftCorner<3, 3>().trace() / 3;
+}
+
+/// The largest variance of a cycle over the loop that is not closed by chance.
+double largest_telling_variance(const std::vector<Keyframe>& keyframes, const WideLoop& loop) {
+  constexpr double kShare = 0.04;  // one in 125 random loops is as near
+  if (!are_joined(keyframes, loop)) return std::numeric_limits<double>::infinity();
+  return kShare * position_variance(reckon(keyframes, loop.match, loop.query).covariance);
+}
+
+/// How two loops stand to each other.
+struct Comparison {
+  int other = 0;
+  bool agrees = false;
+  bool supports = false;
 };
 
-Comparisons compare(const std::vector<Keyframe>& keyframes, std::span<const WideLoop> loops,
-                    double limit) {
+/// Of each loop, both ways.
+std::vector<std::vector<Comparison>> compare(const std::vector<Keyframe>& keyframes,
+                                             std::span<const WideLoop> loops, double limit) {
   constexpr std::size_t kReach = 20;  // to either side
   std::vector<std::size_t> order(loops.size());
   std::iota(order.begin(), order.end(), 0);
@@ -44,16 +63,22 @@ Comparisons compare(const std::vector<Keyframe>& keyframes, std::span<const Wide
     return std::tuple(at(keyframes, loops[i].query).chain, at(keyframes, loops[i].match).chain,
                       loops[i].query);
   });
-  Comparisons result{std::vector<std::vector<std::pair<int, bool>>>(loops.size())};
+  std::vector<double> telling(loops.size());
+  std::ranges::transform(loops, telling.begin(), [&](const WideLoop& loop) {
+    return largest_telling_variance(keyframes, loop);
+  });
+  std::vector<std::vector<Comparison>> result(loops.size());
   for (std::size_t k = 0; k < order.size(); ++k) {
     const std::size_t end = std::min(order.size(), k + kReach + 1);
     for (std::size_t other = k + 1; other < end; ++other) {
       const std::size_t i = order[k];
       const std::size_t j = order[other];
       if (!are_comparable(keyframes, loops[i], loops[j])) break;
-      const bool agree = pair_chi2(keyframes, loops[i], loops[j]) <= limit;
-      result.of_loop[i].emplace_back(static_cast<int>(j), agree);
-      result.of_loop[j].emplace_back(static_cast<int>(i), agree);
+      const Cycle cycle = cycle_of(keyframes, loops[i], loops[j]);
+      const bool agree = cycle.chi2 <= limit;
+      const double variance = cycle.position_variance_m;
+      result[i].push_back({static_cast<int>(j), agree, agree && variance <= telling[i]});
+      result[j].push_back({static_cast<int>(i), agree, agree && variance <= telling[j]});
     }
   }
   return result;
@@ -94,10 +119,14 @@ Reckoned reckon(const std::vector<Keyframe>& keyframes, int from, int to) {
 }
 
 std::optional<double> odometry_chi2(const std::vector<Keyframe>& keyframes, const WideLoop& loop) {
-  if (at(keyframes, loop.match).chain != at(keyframes, loop.query).chain) return std::nullopt;
+  if (!are_joined(keyframes, loop)) return std::nullopt;
   const Reckoned odometry = reckon(keyframes, loop.match, loop.query);
-  return mahalanobis(times(inverse(loop.T_match_query), odometry.T_from_to),
-                     loop.covariance + odometry.covariance);
+  return loop_chi2(loop, odometry);
+}
+
+double loop_chi2(const WideLoop& loop, const Reckoned& known) {
+  return mahalanobis(times(inverse(loop.T_match_query), known.T_from_to),
+                     loop.covariance + known.covariance);
 }
 
 bool are_comparable(const std::vector<Keyframe>& keyframes, const WideLoop& a, const WideLoop& b) {
@@ -105,7 +134,7 @@ bool are_comparable(const std::vector<Keyframe>& keyframes, const WideLoop& a, c
          at(keyframes, a.query).chain == at(keyframes, b.query).chain;
 }
 
-double pair_chi2(const std::vector<Keyframe>& keyframes, const WideLoop& a, const WideLoop& b) {
+Cycle cycle_of(const std::vector<Keyframe>& keyframes, const WideLoop& a, const WideLoop& b) {
   const Reckoned matches = reckon(keyframes, b.match, a.match);
   const Reckoned queries = reckon(keyframes, a.query, b.query);
   // b by way of a: from b's match to that of a, over the loop, and on to b's query. All errors are
@@ -116,13 +145,14 @@ double pair_chi2(const std::vector<Keyframe>& keyframes, const WideLoop& a, cons
   const Matrix6d covariance = b.covariance + queries.covariance +
                               from_query * a.covariance * from_query.transpose() +
                               from_match * matches.covariance * from_match.transpose();
-  return mahalanobis(times(inverse(b.T_match_query), way), covariance);
+  return {mahalanobis(times(inverse(b.T_match_query), way), covariance),
+          position_variance(covariance)};
 }
 
 std::vector<Agreement> find_consistent(const std::vector<Keyframe>& keyframes,
                                        std::span<const WideLoop> loops, double limit) {
   constexpr double kLeastShare = 0.5;
-  const Comparisons comparisons = compare(keyframes, loops, limit);
+  const auto comparisons = compare(keyframes, loops, limit);
   std::vector<Agreement> left(loops.size());
   std::set<std::tuple<double, int, int>> worst_first;  // share, agreeing, loop
   const auto key = [&](int i) {
@@ -130,9 +160,10 @@ std::vector<Agreement> find_consistent(const std::vector<Keyframe>& keyframes,
     return std::tuple(share(a), a.agreeing, i);
   };
   for (std::size_t i = 0; i < loops.size(); ++i) {
-    for (const auto& [other, agree] : comparisons.of_loop[i]) {
+    for (const Comparison& comparison : comparisons[i]) {
       ++left[i].compared;
-      left[i].agreeing += agree ? 1 : 0;
+      left[i].agreeing += comparison.agrees ? 1 : 0;
+      left[i].supporting += comparison.supports ? 1 : 0;
     }
     worst_first.insert(key(static_cast<int>(i)));
   }
@@ -140,13 +171,14 @@ std::vector<Agreement> find_consistent(const std::vector<Keyframe>& keyframes,
     const int worst = std::get<2>(*worst_first.begin());
     worst_first.erase(worst_first.begin());
     left[static_cast<std::size_t>(worst)].is_consistent = false;
-    for (const auto& [other, agree] : comparisons.of_loop[static_cast<std::size_t>(worst)]) {
-      Agreement& neighbour = left[static_cast<std::size_t>(other)];
+    for (const Comparison& comparison : comparisons[static_cast<std::size_t>(worst)]) {
+      Agreement& neighbour = left[static_cast<std::size_t>(comparison.other)];
       if (!neighbour.is_consistent) continue;
-      worst_first.erase(key(other));
+      worst_first.erase(key(comparison.other));
       --neighbour.compared;
-      neighbour.agreeing -= agree ? 1 : 0;
-      worst_first.insert(key(other));
+      neighbour.agreeing -= comparison.agrees ? 1 : 0;
+      neighbour.supporting -= comparison.supports ? 1 : 0;
+      worst_first.insert(key(comparison.other));
     }
   }
   return left;

@@ -27,20 +27,31 @@ struct Reckoned {
 };
 Reckoned reckon(const std::vector<Keyframe>& keyframes, int from, int to);
 
-/// Squared Mahalanobis distance of a loop from odometry. None if odometry does not connect the two.
+/// Squared Mahalanobis distance of a loop from what is known of the same motion.
+double loop_chi2(const WideLoop& loop, const Reckoned& known);
+
+/// The same from odometry. None if odometry does not connect the two.
 std::optional<double> odometry_chi2(const std::vector<Keyframe>& keyframes, const WideLoop& loop);
 
 /// Whether two loops join the same chains, so that they can be compared.
 bool are_comparable(const std::vector<Keyframe>& keyframes, const WideLoop& a, const WideLoop& b);
 
-/// Squared Mahalanobis distance of the cycle over two loops and the odometry between their ends: 6
-/// degrees of freedom. For comparable loops. Cost: 2 us.
-double pair_chi2(const std::vector<Keyframe>& keyframes, const WideLoop& a, const WideLoop& b);
+/// The cycle over two loops and the odometry between their ends.
+struct Cycle {
+  double chi2 = 0;                 ///< squared Mahalanobis distance, 6 degrees of freedom
+  double position_variance_m = 0;  ///< per axis, m^2: what the comparison cannot tell
+};
+
+/// For comparable loops. Cost: 2 us.
+Cycle cycle_of(const std::vector<Keyframe>& keyframes, const WideLoop& a, const WideLoop& b);
 
 /// How a loop stands to those nearby.
 struct Agreement {
   int compared = 0;
   int agreeing = 0;
+  /// Loops that agree, and would hardly do so by chance: the cycle is known much better than what
+  /// odometry alone says of the loop.
+  int supporting = 0;
   bool is_consistent = true;
 };
 

@@ -179,8 +179,10 @@ int freedom_of(PoseKnown known) {
 
 ceres::Problem::Options PoseProblem::problem_options() {
   ceres::Problem::Options options;
+  options.cost_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
   options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  options.enable_fast_removal = true;
   options.disable_all_safety_checks = true;
   return options;
 }
@@ -198,8 +200,19 @@ void PoseProblem::add(const Edge& edge, double weight) {
   for (double* pose : {from, to}) {
     if (!problem_.HasParameterBlock(pose)) problem_.AddParameterBlock(pose, 7, manifold_.get());
   }
-  problem_.AddResidualBlock(cost_function(edge, seen_within_m_).release(),
-                            &losses_.emplace_back(weight), from, to);
+  terms_.push_back({.from = from, .to = to, .cost = cost_function(edge, seen_within_m_)});
+  set_weight(terms_.size() - 1, weight);
+}
+
+void PoseProblem::set_weight(std::size_t edge, double weight) {
+  Term& term = terms_[edge];
+  term.loss.weight = weight;
+  if (weight == 0 && term.block != nullptr) {
+    problem_.RemoveResidualBlock(term.block);
+    term.block = nullptr;
+  } else if (weight > 0 && term.block == nullptr) {
+    term.block = problem_.AddResidualBlock(term.cost.get(), &term.loss, term.from, term.to);
+  }
 }
 
 void PoseProblem::fix(int keyframe) {
@@ -215,6 +228,8 @@ double PoseProblem::solve(int max_iterations) {
   options.max_num_iterations = max_iterations;
   options.function_tolerance = 1e-7;
   options.num_threads = 1;
+  // Nearly a Gauss-Newton step: more damping holds long chains back.
+  options.initial_trust_region_radius = 1e10;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem_, &summary);

@@ -33,7 +33,8 @@ class PoseProblem {
 
   void add(const Edge& edge, double weight = 1);
   /// Its residuals count `weight` times from the next solve() on. Edges by the order of add().
-  void set_weight(std::size_t edge, double weight) { losses_[edge].weight = weight; }
+  /// An edge of weight 0 costs nothing.
+  void set_weight(std::size_t edge, double weight);
   /// Only if an edge has the keyframe.
   void fix(int keyframe);
   /// Levenberg-Marquardt with sparse Cholesky factors. Returns the cost.
@@ -42,13 +43,19 @@ class PoseProblem {
  private:
   /// A factor that may change between solves.
   struct WeightLoss final : ceres::LossFunction {
-    explicit WeightLoss(double w) : weight(w) {}
     void Evaluate(double squared, double* rho) const override {
       rho[0] = weight * squared;
       rho[1] = weight;
       rho[2] = 0;
     }
-    double weight;
+    double weight = 0;
+  };
+  struct Term {
+    double* from = nullptr;
+    double* to = nullptr;
+    std::unique_ptr<ceres::CostFunction> cost;
+    WeightLoss loss;
+    ceres::ResidualBlockId block = nullptr;  ///< none while the weight is 0
   };
 
   static ceres::Problem::Options problem_options();
@@ -56,7 +63,7 @@ class PoseProblem {
   std::vector<Pose>& poses_;
   double seen_within_m_;
   std::unique_ptr<ceres::Manifold> manifold_;
-  std::deque<WeightLoss> losses_;
+  std::deque<Term> terms_;
   ceres::Problem problem_;
 };
 
