@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <vector>
 
 #include <fmt/format.h>
@@ -146,14 +147,14 @@ Outcome judge_injected(int seeds) {
   return at_30;
 }
 
-/// Seconds of solve().
+/// Seconds of processor time of solve(), which has one thread: others may use the machine.
 double time_batch() {
   const SyntheticGraph drive =
       make_synthetic_graph({.keyframes = 10'000, .loops = 4500, .wrong_share = 0.1, .blocks = 14});
   LoopGraph graph = graph_of(drive);
-  const auto begin = Clock::now();
+  const std::clock_t begin = std::clock();
   graph.solve();
-  const double time_s = seconds_since(begin);
+  const double time_s = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   int wrong_kept = 0;
   int right_lost = 0;
   for (std::size_t i = 0; i < drive.loops.size(); ++i) {

@@ -54,7 +54,7 @@ class PoseProblem {
     double* from = nullptr;
     double* to = nullptr;
     std::unique_ptr<ceres::CostFunction> cost;
-    WeightLoss loss;
+    WeightLoss loss{};
     ceres::ResidualBlockId block = nullptr;  ///< none while the weight is 0
   };
 
