@@ -91,6 +91,8 @@ std::vector<Pose> relaxed_poses(int count, std::span<const WeighedMotion> motion
   for (int k = 0; k < count; ++k) {
     Eigen::Map<Eigen::Vector3d>(poses[static_cast<std::size_t>(k)].data()) = solved.row(k);
   }
+  // Exactly, not only within rounding.
+  for (const int keyframe : fixed) poses[static_cast<std::size_t>(keyframe)] = kIdentity;
   return poses;
 }
 
