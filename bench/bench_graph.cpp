@@ -80,7 +80,7 @@ void add_robust(const SyntheticGraph& drive, Outcome& outcome) {
 /// residual is within the limit that LoopGraph has, too.
 void add_plain(const SyntheticGraph& drive, bool huber, Outcome& outcome) {
   constexpr double kHuber = 1.345;
-  constexpr int kRounds = 5;
+  constexpr int kRounds = 10;
   const LoopGraphOptions options;
   std::vector<graph::Edge> edges;
   std::vector<graph::Pose> poses;
@@ -99,12 +99,12 @@ void add_plain(const SyntheticGraph& drive, bool huber, Outcome& outcome) {
     return graph::chi2_of(edges[i], poses[static_cast<std::size_t>(edges[i].from)],
                           poses[static_cast<std::size_t>(edges[i].to)], options.seen_within_m);
   };
-  problem.solve(30);
+  problem.solve(100);
   for (int round = 0; huber && round < kRounds; ++round) {
     for (std::size_t i = 0; i < edges.size(); ++i) {
       problem.set_weight(i, std::min(1.0, kHuber / std::sqrt(std::max(chi2(i), 1e-12))));
     }
-    problem.solve(5);
+    problem.solve(20);
   }
   std::vector<bool> is_kept;
   for (std::size_t i = 0; i < edges.size(); ++i) {
