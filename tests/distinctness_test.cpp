@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -104,6 +105,33 @@ TEST(KnownLoops, TheNearestLoopTells) {
   EXPECT_EQ(loops.first_visit(103), 20);
   EXPECT_EQ(loops.first_visit(105), 30);
   EXPECT_EQ(loops.first_visit(118), 30);
+}
+
+TEST(KnownLoops, AllVisitsAreFoundFromAnyLap) {
+  KnownLoops loops;
+  for (std::ptrdiff_t step = 100; step < 120; ++step) loops.add(step, step - 99);
+  for (std::ptrdiff_t step = 200; step < 220; ++step) {
+    KnownLoops found;
+    found.add(step, step - 100);
+    loops.take(found);
+  }
+  const auto visits = [&](std::ptrdiff_t step, std::ptrdiff_t end) {
+    std::set<std::ptrdiff_t> steps;
+    loops.for_each_visit(step, end, [&](std::ptrdiff_t s) { steps.insert(s); });
+    return steps;
+  };
+  using Steps = std::set<std::ptrdiff_t>;
+  const Steps first{107, 108, 109, 110, 111};  // and the steps beside
+  const Steps second{207, 208, 209, 210, 211};
+  Steps all = first;
+  all.insert(second.begin(), second.end());
+  EXPECT_EQ(visits(109, 500), all);
+  all.insert(10);
+  EXPECT_EQ(visits(10, 500), all);
+  EXPECT_EQ(visits(10, 50), Steps{10});
+  EXPECT_EQ(visits(60, 500), Steps{60});
+  for (std::ptrdiff_t step = 200; step < 220; ++step) loops.remove(step, step - 100);
+  EXPECT_EQ(visits(109, 500), first);
 }
 
 TEST(KnownLoops, LapsLeadBackToTheFirst) {

@@ -46,6 +46,7 @@ struct FilterRobot {
   double min_score = 0.98;
   KnownLoops loops;
   std::function<bool(std::ptrdiff_t)> may_be_at = [](std::ptrdiff_t) { return true; };
+  std::function<double(std::ptrdiff_t)> return_weight = [](std::ptrdiff_t) { return 1.0; };
   std::size_t num_similar = kSimilar;
   int frame = 0;
   LateLoops::Found changed;  ///< by the latest frame
@@ -62,8 +63,8 @@ struct FilterRobot {
   }
 
   [[nodiscard]] PlaceFilter::Update look(const FoundAt& found, bool is_step = true) const {
-    return filter.update(filter.predict(is_step), candidates(found), num_similar, kSteps, loops,
-                         may_be_at);
+    return filter.update(filter.predict(is_step), candidates(found), num_similar,
+                         {kSteps, may_be_at, return_weight}, loops);
   }
 
   PlaceFilter::Update see(const FoundAt& found, bool is_step = true) {

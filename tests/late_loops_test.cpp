@@ -170,8 +170,12 @@ TEST(LateLoops, ItLooksBackABoundedWay) {
 TEST(PathMotion, OneStepEarlierUndoesOneStepLater) {
   Belief belief{{{100, 0.4, 0.1}, {200, 0.2, 0.0}}};
   Belief prior = one_step_later(belief);
-  const Returns returns = returns_to({100, 101, 500, 100}, kSteps);
-  EXPECT_EQ(returns.steps, (std::vector<std::ptrdiff_t>{100, 101, 500}));
+  const Returns returns = returns_to({100, 101, 500, 100}, kSteps,
+                                     [](std::ptrdiff_t step) { return step == 101 ? 0.5 : 1.0; });
+  ASSERT_EQ(returns.size(), 3U);
+  EXPECT_EQ(returns[2].step, 500);
+  EXPECT_EQ(probability_at(returns, 101), probability_at(returns, 100) / 2);
+  EXPECT_EQ(probability_at(returns, 102), 0);
   add_returns(returns, prior);
   // A frame that tells nothing leaves the past as it was.
   const Belief same = one_step_earlier(belief, prior, returns, prior);

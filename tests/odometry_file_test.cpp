@@ -11,6 +11,7 @@
 
 #include "loopbit/record_run.hpp"
 
+#include "map_support.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {

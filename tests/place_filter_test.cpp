@@ -168,11 +168,23 @@ TEST(PlaceFilter, MapsFullOfLookAlikesDemandMoreInliers) {
   EXPECT_GT(clear.look(found).observed.back().geometry, before);
 }
 
+TEST(PlaceFilter, OdometryTellsTwinsApart) {
+  const FoundAt twins{{100, {.votes = 30, .inliers = 60}}, {900, {.votes = 33, .inliers = 70}}};
+  FilterRobot robot;
+  EXPECT_LT(robot.look(twins).probability, robot.min_score);
+  robot.return_weight = [](std::ptrdiff_t step) { return step == 900 ? 1e-4 : 1.0; };
+  const PlaceFilter::Update update = robot.look(twins);
+  ASSERT_TRUE(update.match);
+  EXPECT_EQ(update.observed[*update.match].step, 100);
+  EXPECT_GE(update.probability, robot.min_score);
+}
+
 TEST(PlaceFilter, GeometryOfASmallMapSaysLess) {
   const FilterRobot robot;
   const auto term_among = [&](std::ptrdiff_t steps) {
     return robot.filter
-        .update({}, {candidate(5, {.votes = 40, .inliers = 40})}, 1, steps, {}, robot.may_be_at)
+        .update({}, {candidate(5, {.votes = 40, .inliers = 40})}, 1,
+                {steps, robot.may_be_at, robot.return_weight}, {})
         .observed.front()
         .geometry;
   };

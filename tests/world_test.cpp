@@ -144,6 +144,94 @@ TEST(WorldRender, GivesTheSameBytesOnEveryMachine) {
   EXPECT_EQ(fnv1a(world.render(140)), kGolden140);
 }
 
+WorldOptions small_tower() {
+  WorldOptions options = small_world();
+  options.frames = 600;
+  options.laps = 2;
+  options.floors = 3;
+  options.spacing_m = 1.1;
+  return options;
+}
+
+TEST(WorldFloors, LookAlikeAndStandOnEachOther) {
+  WorldOptions options = small_tower();
+  options.moving_objects = 0;
+  options.noise = 0;
+  options.light_change = 0;
+  const World world(options);
+  EXPECT_NEAR(world.circuit_m(), 110, 1e-9);
+  EXPECT_EQ(world.lap(399), 3);
+  EXPECT_EQ(world.lap(400), 4);
+  // Away from the ramp, and from where the camera comes back from the line of the second lap.
+  const Pose below = world.pose(60);
+  const Pose above = world.pose(260);
+  EXPECT_EQ(below.z_m, 0);
+  EXPECT_EQ(above.z_m, 3);
+  EXPECT_EQ(world.pose(599).z_m, 6);
+  EXPECT_NEAR(std::hypot(below.x_m - above.x_m, below.y_m - above.y_m), 0, 0.4);
+  EXPECT_GT(correlation(edges(world.render(60)), edges(world.render(260))), 0.5);
+  EXPECT_EQ(world.T_world_camera(260)(1, 3), world.T_world_camera(60)(1, 3) - 3);
+  for (int frame = 1; frame < options.frames; ++frame) {
+    const Pose from = world.pose(frame - 1);
+    const Pose to = world.pose(frame);
+    EXPECT_LT(std::hypot(to.x_m - from.x_m, to.y_m - from.y_m), 1.5) << frame;
+    EXPECT_LT(to.z_m - from.z_m, 0.3) << frame;
+  }
+}
+
+TEST(WorldFloors, PlacesOfOtherFloorsAreOthers) {
+  const World world(small_tower());
+  const std::set<Pair> same = pairs_of(world.same_place());
+  EXPECT_FALSE(same.empty());
+  const std::set<Pair> near = pairs_of(world.near_place());
+  for (const auto& [query, frame] : near) {
+    EXPECT_LE(std::abs(world.pose(query).z_m - world.pose(frame).z_m), 2.5);
+  }
+  EXPECT_TRUE(std::ranges::includes(near, same));
+  // The first lap on each floor has none, but for the ramp, the second has.
+  EXPECT_FALSE(queries_of(world.near_place()).contains(250));
+  EXPECT_TRUE(queries_of(world.same_place()).contains(350));
+}
+
+TEST(WorldFloors, BadOptionsAreNamed) {
+  WorldOptions options = small_tower();
+  options.reverse_second_lap = true;
+  EXPECT_NE(refusal_of(options).find("world.floors is 3"), std::string::npos);
+  options = small_tower();
+  options.frames = 500;
+  EXPECT_NE(refusal_of(options).find("take 579 frames or more"), std::string::npos)
+      << refusal_of(options);
+}
+
+TEST(WorldOdometry, DriftsAsItsCovariancesSay) {
+  double sum = 0;
+  double heights = 0;
+  int count = 0;
+  for (int seed = 1; seed <= 12; ++seed) {
+    WorldOptions options = small_tower();
+    options.seed = seed;
+    const World world(options);
+    const std::vector<OdometryPose> odometry = drifting_odometry(world);
+    EXPECT_EQ(odometry[70].T_odometry_camera, drifting_odometry(world)[70].T_odometry_camera);
+    OdometryTrack track;
+    for (const OdometryPose& pose : odometry) track.add(pose);
+    for (const int to : {199, 399, 599}) {
+      const int from = to - 199;
+      const Motion motion = track.between(from, to).value();
+      const cv::Matx44d truth = world.T_world_camera(from).inv() * world.T_world_camera(to);
+      const cv::Matx44d error = motion.T_from_to.inv() * truth;
+      const cv::Vec3d p(error(0, 3), error(1, 3), error(2, 3));
+      sum += p.dot(motion.covariance.get_minor<3, 3>(0, 0).inv() * p) / 3;
+      heights += p[1] * p[1];
+      ++count;
+    }
+  }
+  EXPECT_GT(sum / count, 0.5);
+  EXPECT_LT(sum / count, 1.6);
+  // 1 % of 10 m, for 220 m.
+  EXPECT_NEAR(std::sqrt(heights / count), 0.1 * std::sqrt(22), 0.2);
+}
+
 TEST(WorldRender, HasTheSizeAskedFor) {
   WorldOptions options = small_world();
   options.width_px = 321;

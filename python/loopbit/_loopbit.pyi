@@ -69,9 +69,11 @@ class DecisionCounts:
     def wrong(self) -> int: ...
 
 class DecisionOptions:
-    def __init__(self, *, min_score: float = ..., count_matches: bool = ...) -> None: ...
+    def __init__(self, *, min_score: float = ..., count_matches: bool = ..., reach_m: float = ..., reach_up_m: float = ...) -> None: ...
     count_matches: bool
     min_score: float
+    reach_m: float
+    reach_up_m: float
 
 class Detection:
     @property
@@ -514,6 +516,7 @@ class Status:
     no_earlier_place: ClassVar[Status]
     no_geometry: ClassVar[Status]
     no_similar_place: ClassVar[Status]
+    unreachable: ClassVar[Status]
     unreadable: ClassVar[Status]
     @property
     def value(self) -> int: ...

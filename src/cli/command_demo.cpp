@@ -37,7 +37,7 @@ Positions positions(const World& world, std::size_t frames) {
   positions.reserve(frames);
   for (int frame = 0; static_cast<std::size_t>(frame) < frames; ++frame) {
     const Pose pose = world.pose(frame);
-    positions.emplace_back(cv::Vec3d(pose.x_m, pose.y_m, 0.0));
+    positions.emplace_back(cv::Vec3d(pose.x_m, pose.y_m, pose.z_m));
   }
   return positions;
 }
@@ -63,7 +63,7 @@ void write_images(const World& world, const std::string& folder, bool quiet) {
   if (quiet) return;
   fmt::print(
       "written    {0}/images ({1} frames of the {2}), {0}/truth.csv, {0}/not_false.csv, "
-      "{0}/poses.txt, {0}/times.txt\n",
+      "{0}/poses.txt, {0}/odometry.txt, {0}/times.txt\n",
       folder, world.options().frames, describe(world));
 }
 

@@ -39,6 +39,7 @@ void print_reasons(const std::vector<Detection>& detections) {
       {Status::no_geometry, "features match, but not as one rigid scene"},
       {Status::low_score, "geometry found, but too little evidence"},
       {Status::ambiguous, "enough evidence, but other places share it"},
+      {Status::unreachable, "evidence of a place out of reach, by odometry"},
       {Status::unreadable, "image unreadable"}};
   for (const auto& [status, meaning] : kReasons) {
     const auto frames = count(detections, status);
@@ -109,6 +110,9 @@ void print_summary(const RunOutcome& run, const std::string& report) {
   print_revisits(detections);
   print_changes(detections);
   print_reasons(detections);
+  if (const std::string doubt = odometry_doubt(detections); !doubt.empty()) {
+    fmt::print("odometry   {}\n", doubt);
+  }
   if (record.score) print_score(*record.score);
   print_times(record, detections);
   fmt::print("written    {0}/loops.csv, {0}/late_loops.csv, {0}/run.json\n", printable(run.folder));

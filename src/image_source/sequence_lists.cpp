@@ -121,8 +121,9 @@ std::optional<std::size_t> number_of(const std::string& image) {
   return parse_number<std::size_t>(fs::path(image).stem().string());
 }
 
-ImageList list_kitti(const fs::path& folder, std::string_view camera) {
-  ImageList list = list_images(folder / camera, fmt::format("KITTI odometry sequence, {}", camera));
+/// `camera`: the folder of images. Their times are in times.txt, if there is one.
+ImageList list_timed(const fs::path& folder, std::string_view camera, std::string description) {
+  ImageList list = list_images(folder / camera, std::move(description));
   const fs::path file = folder / "times.txt";
   if (!is_file(file)) return list;
   const std::vector<double> times = read_times(file);
@@ -203,10 +204,14 @@ bool natural_less(std::string_view a, std::string_view b) {
 
 ImageList list_folder(const fs::path& folder) {
   for (const std::string_view camera : {"image_0", "image_2"}) {
-    if (is_folder(folder / camera)) return list_kitti(folder, camera);
+    if (!is_folder(folder / camera)) continue;
+    return list_timed(folder, camera, fmt::format("KITTI odometry sequence, {}", camera));
   }
   if (const auto camera = find_euroc_camera(folder)) return list_euroc(*camera);
   if (is_file(folder / "rgb.txt")) return list_tum(folder);
+  if (is_folder(folder / "images") && is_file(folder / "times.txt")) {
+    return list_timed(folder, "images", "folder with images and times.txt");
+  }
   return list_images(folder, "folder of images");
 }
 

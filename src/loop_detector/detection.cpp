@@ -20,6 +20,8 @@ std::string_view to_string(Status status) {
       return "low_score";
     case Status::ambiguous:
       return "ambiguous";
+    case Status::unreachable:
+      return "unreachable";
     case Status::unreadable:
       return "unreadable";
   }

@@ -14,14 +14,18 @@ constexpr std::ptrdiff_t kMaxStepsToLoop = 10;
 }  // namespace
 
 void KnownLoops::add(std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
-  loops_.try_emplace(step, Loop{earlier_step, first_visit(earlier_step)});
+  const std::ptrdiff_t first = first_visit(earlier_step);
+  const bool is_new = loops_.try_emplace(step, Loop{earlier_step, first}).second;
+  if (is_new) steps_.emplace(first, step);
 }
 
 void KnownLoops::take(KnownLoops& others) {
   while (!others.loops_.empty()) {
     auto node = others.loops_.extract(others.loops_.begin());
-    node.mapped().first_visit = first_visit(node.mapped().earlier_step);
-    loops_.insert(std::move(node));
+    auto step = others.steps_.extract(others.steps_.begin());  // of any, for its memory
+    step.mapped() = node.key();
+    step.key() = node.mapped().first_visit = first_visit(node.mapped().earlier_step);
+    if (loops_.insert(std::move(node)).inserted) steps_.insert(std::move(step));
   }
 }
 
@@ -32,6 +36,7 @@ void KnownLoops::remove(std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
   // Later loops may have led to the same first visit through this one.
   KnownLoops others;
   others.loops_.swap(loops_);
+  others.steps_.swap(steps_);
   take(others);
 }
 

@@ -26,6 +26,19 @@ class KnownLoops {
   /// away tell; else `step` itself. Logarithmic in the loops.
   [[nodiscard]] std::ptrdiff_t first_visit(std::ptrdiff_t step) const;
 
+  /// Calls visit(s) with `step`, and each step s before `end` that shows the same place, as far as
+  /// loops to within 2 steps of it tell. Logarithmic in the loops.
+  template <typename Visit>
+  void for_each_visit(std::ptrdiff_t step, std::ptrdiff_t end, const Visit& visit) const {
+    constexpr std::ptrdiff_t kNear = 2;  // a match is the nearest step or one beside it
+    const std::ptrdiff_t first = first_visit_of(step).value_or(step);
+    const auto last = steps_.upper_bound(first + kNear);
+    visit(step);
+    for (auto at = steps_.lower_bound(first - kNear); at != last; ++at) {
+      if (at->second < end && at->second != step) visit(at->second);
+    }
+  }
+
   /// The same step if `step` itself was found to be a revisit.
   [[nodiscard]] std::optional<std::ptrdiff_t> first_visit_of(std::ptrdiff_t step) const;
 
@@ -35,7 +48,8 @@ class KnownLoops {
     std::ptrdiff_t first_visit = 0;
   };
 
-  std::map<std::ptrdiff_t, Loop> loops_;  ///< by step
+  std::map<std::ptrdiff_t, Loop> loops_;                 ///< by step
+  std::multimap<std::ptrdiff_t, std::ptrdiff_t> steps_;  ///< of loops_, by first visit
 };
 
 }  // namespace loopbit

@@ -24,6 +24,7 @@
 #include "late_loops.hpp"
 #include "place_filter.hpp"
 #include "place_memory.hpp"
+#include "reach.hpp"
 #include "recent_view.hpp"
 #include "workspace.hpp"
 
@@ -136,7 +137,9 @@ class LoopDetector::Impl {
     std::vector<Keypoint> all_keypoints;  ///< with those of what moves with the camera
     Features features;
     RecentView::Look look;
-    PlaceTest is_allowed;   ///< as a candidate; empty = all places are
+    PlaceTest is_allowed;  ///< as a candidate; empty = all places are
+    PlaceTest is_too_far;  ///< by odometry; empty = there is none
+    std::optional<Reach> reach;
     int view_inliers = 0;   ///< see inlier_worth()
     PlaceId compared = -1;  ///< the recent place that `work` compares it with
     std::vector<VerifiedCandidate> verified;
@@ -186,6 +189,7 @@ class LoopDetector::Impl {
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, detection.timestamp_s);
     seen.is_allowed = filter_.test(allowed, seen.look.is_step);
+    if (detection.odometry) keep_in_reach(*detection.odometry, end, seen);
     seen.view_inliers = view_inliers(seen);
     detection.times.verification_ms = stopwatch.lap_ms();
 
@@ -203,6 +207,7 @@ class LoopDetector::Impl {
     seen.closely = revisit >= kWorthACloserLook;
     seen.verified = seen.work->candidates.verify(verified_query(seen), candidates, num_similar);
     decide(seen, std::move(prior), num_similar, end, detection);
+    report_unreachable(seen, end, detection);
     report_earlier_frames(seen, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
   }
@@ -520,6 +525,30 @@ class LoopDetector::Impl {
     return step < 0 ? memory_.place_of(step) : recent_view_.place_of(step);
   }
 
+  /// How far `place` is by odometry, see Reach::chi2(): the most of all visits before `end`, since
+  /// what drifted least since one of them tells most. Places of earlier sessions are not known to
+  /// odometry.
+  [[nodiscard]] double chi2(const Reach& reach, PlaceId place, PlaceId end) const {
+    const PlaceId begin = memory_.session_begin();
+    double most = place < begin ? 0 : reach.chi2(place - begin);
+    known_loops_.for_each_visit(step_of(place), recent_view_.step_of(end), [&](std::ptrdiff_t at) {
+      const auto visited = at == step_of(place) ? std::nullopt : place_of(at);
+      if (visited && *visited >= begin) most = std::max(most, reach.chi2(*visited - begin));
+    });
+    return most;
+  }
+
+  /// `end`: of the candidates.
+  void keep_in_reach(const OdometryPose& odometry, PlaceId end, Observation& seen) const {
+    seen.reach.emplace(odometry_, odometry, options_.decision);
+    const PlaceTest wanted = std::exchange(seen.is_allowed, {});
+    const auto test = [this, wanted, end, &reach = *seen.reach](PlaceId place, bool in_reach) {
+      return (!wanted || wanted(place)) && (chi2(reach, place, end) <= Reach::kMaxChi2) == in_reach;
+    };
+    seen.is_allowed = [test](PlaceId place) { return test(place, true); };
+    seen.is_too_far = [test](PlaceId place) { return test(place, false); };
+  }
+
   static bool is_candidate(PlaceId place, PlaceId end, const Observation& seen) {
     return place < end && (!seen.is_allowed || seen.is_allowed(place));
   }
@@ -554,11 +583,20 @@ class LoopDetector::Impl {
       if (!seen.verified.empty()) decide_by_matches(seen, detection);
       return;
     }
-    seen.update = place_filter_.update(std::move(prior), seen.verified, num_similar,
-                                       steps_before(end), known_loops_, [&](std::ptrdiff_t step) {
-                                         const auto place = place_of(step);
-                                         return place && is_candidate(*place, end, seen);
-                                       });
+    const PlaceFilter::Steps steps{
+        .number = steps_before(end),
+        .may_be_at =
+            [&](std::ptrdiff_t step) {
+              const auto place = place_of(step);
+              return place && is_candidate(*place, end, seen);
+            },
+        .return_weight =
+            [&](std::ptrdiff_t step) {
+              const auto place = seen.reach ? place_of(step) : std::nullopt;
+              return place ? Reach::weight(chi2(*seen.reach, *place, end)) : 1.0;
+            }};
+    seen.update =
+        place_filter_.update(std::move(prior), seen.verified, num_similar, steps, known_loops_);
     if (!seen.update.match) return;
     report_match(seen.verified[*seen.update.match], seen, detection);
     detection.score = seen.update.probability;
@@ -567,6 +605,42 @@ class LoopDetector::Impl {
                        : seen.update.revisit >= decision.min_score
                            ? Status::ambiguous
                            : reason_of_rejection(*seen.best->geometry, options_.verification);
+  }
+
+  /// Evidence of a place out of reach, where there is no loop: either that place looks like this
+  /// one, or odometry is wrong.
+  void report_unreachable(Observation& seen, PlaceId end, Detection& detection) const {
+    constexpr int kLooks = 3;
+    constexpr double kEvident = 0.5;
+    if (detection.status == Status::loop || !seen.is_too_far) return;
+    RetrievalOptions few = options_.retrieval;
+    few.max_candidates = kLooks;
+    const auto candidates = index_.query(seen.content, end, few, nullptr, seen.is_too_far);
+    const auto verified =
+        seen.work->candidates.verify(verified_query(seen), candidates, candidates.size());
+    const VerifiedCandidate* best = nullptr;
+    double most = std::min(kEvident, options_.decision.min_score);
+    for (const VerifiedCandidate& v : verified) {
+      const double probability = probability_alone(v, end);
+      if (probability < most) continue;
+      most = probability;
+      best = &v;
+    }
+    if (best == nullptr) return;
+    detection.match.reset();
+    detection.earlier_match.reset();
+    report_match(*best, seen, detection);
+    detection.status = Status::unreachable;
+    detection.score = 0;
+    detection.terms.reset();
+  }
+
+  [[nodiscard]] double probability_alone(const VerifiedCandidate& v, PlaceId end) const {
+    if (!v.geometry) return 0;
+    if (options_.decision.count_matches) {
+      return v.geometry->matches >= options_.decision.min_score ? 1 : 0;
+    }
+    return place_filter_.probability_alone(v.geometry->evidence(), steps_before(end));
   }
 
   /// What the frame tells of those before it.

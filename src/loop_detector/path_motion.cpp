@@ -36,11 +36,11 @@ class Ratios {
       if (known->forward > 0) ratio.forward = h.forward / known->forward;
       if (known->backward > 0) ratio.backward = h.backward / known->backward;
     }
-    for (const std::ptrdiff_t step : returns.steps) {
+    for (const auto& [step, probability] : returns) {
       const auto there = find(ratios_, step);
       if (there == ratios_.end()) continue;
-      away -= 2 * returns.probability;
-      away_ += returns.probability * (there->forward + there->backward);
+      away -= 2 * probability;
+      away_ += probability * (there->forward + there->backward);
     }
     away_ += away * new_ratio;
   }
@@ -99,10 +99,21 @@ double from_anywhere(std::ptrdiff_t num_steps) {
   return kReturn / static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps));
 }
 
-Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps) {
+double probability_at(const Returns& returns, std::ptrdiff_t step) {
+  const auto found = std::ranges::lower_bound(returns, step, {}, &Return::step);
+  return found != returns.end() && found->step == step ? found->probability : 0.0;
+}
+
+Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,
+                   const std::function<double(std::ptrdiff_t)>& weight) {
   std::ranges::sort(steps);
   steps.erase(std::unique(steps.begin(), steps.end()), steps.end());
-  return {std::move(steps), from_anywhere(num_steps) / 2};
+  Returns returns;
+  returns.reserve(steps.size());
+  for (const std::ptrdiff_t step : steps) {
+    returns.push_back({step, from_anywhere(num_steps) / 2 * weight(step)});
+  }
+  return returns;
 }
 
 Belief one_step_later(const Belief& belief) {
@@ -123,8 +134,9 @@ Belief one_step_later(const Belief& belief) {
 }
 
 void add_returns(const Returns& returns, Belief& belief) {
-  const double share = returns.probability * belief.elsewhere();
-  for (const std::ptrdiff_t step : returns.steps) {
+  const double elsewhere = belief.elsewhere();
+  for (const auto& [step, probability] : returns) {
+    const double share = probability * elsewhere;
     Hypothesis& at = hypothesis_at(belief.places, step);
     at.forward += share;
     at.backward += share;

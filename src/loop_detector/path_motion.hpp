@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -27,12 +28,17 @@ struct Belief {
   [[nodiscard]] std::optional<std::ptrdiff_t> peak() const;
 };
 
-/// The places that a robot elsewhere may return to at a step, and with which probability to each,
-/// in either direction.
-struct Returns {
-  std::vector<std::ptrdiff_t> steps;  ///< in order
+/// That a robot elsewhere returns to a step, in each direction.
+struct Return {
+  std::ptrdiff_t step = 0;
   double probability = 0;
 };
+
+/// To each of some steps, in their order.
+using Returns = std::vector<Return>;
+
+/// To `step`; 0 where it is not among them.
+double probability_at(const Returns& returns, std::ptrdiff_t step);
 
 /// The hypothesis of a step, which is inserted if there is none. `places`: in the order of steps.
 Hypothesis& hypothesis_at(std::vector<Hypothesis>& places, std::ptrdiff_t step);
@@ -41,7 +47,9 @@ Hypothesis& hypothesis_at(std::vector<Hypothesis>& places, std::ptrdiff_t step);
 // turns round on it, leaves it, or returns anywhere. docs/method.md, section 4, has the model.
 
 /// `num_steps`: how many there are to return to. `steps`: those that were looked at.
-Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps);
+/// `weight(step)`: 0 to 1, how well the return agrees with odometry.
+Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,
+                   const std::function<double(std::ptrdiff_t)>& weight);
 
 /// That a robot which returns does so to a certain one of `num_steps` steps.
 double from_anywhere(std::ptrdiff_t num_steps);

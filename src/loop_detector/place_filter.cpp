@@ -174,7 +174,7 @@ double log_odds_from_anywhere(const Posterior& posterior, const ScoreTerms& term
 
 /// Which candidate is the match. `middle`: the likeliest step, if there is one.
 std::optional<std::size_t> choose_match(std::optional<std::ptrdiff_t> middle,
-                                        std::ptrdiff_t num_steps, const KnownLoops& loops,
+                                        const KnownLoops& loops,
                                         const PlaceFilter::Update& update) {
   using Observed = PlaceFilter::Observed;
   const auto any = [](const Observed& /*o*/) { return true; };
@@ -183,7 +183,8 @@ std::optional<std::size_t> choose_match(std::optional<std::ptrdiff_t> middle,
   // A place elsewhere that shows so much by itself that it needs no path shares the view, from
   // closer.
   const auto best = best_of(update.observed, any, [&](const Observed& o) {
-    return ratio(o) + std::log(std::max(update.prior.at(o.step), from_anywhere(num_steps) / 2));
+    return ratio(o) +
+           std::log(std::max(update.prior.at(o.step), probability_at(update.returns, o.step)));
   });
   if (!best || !PlaceFilter::is_near(update.observed[*best].step, *middle, loops)) return best;
   return PlaceFilter::match_near(*middle, update.observed, update.belief, loops);
@@ -191,12 +192,12 @@ std::optional<std::size_t> choose_match(std::optional<std::ptrdiff_t> middle,
 
 /// Why the match is as probable as it is.
 ScoreTerms explain(std::optional<std::ptrdiff_t> middle, const Posterior& posterior,
-                   std::ptrdiff_t num_steps, const KnownLoops& loops,
+                   const Returns& returns, const KnownLoops& loops,
                    const PlaceFilter::Observed& match) {
   const double ratio = match.log_likelihood_ratio();
   ScoreTerms terms{.votes = match.votes,
                    .geometry = ratio - match.votes,
-                   .prior = std::log(from_anywhere(num_steps))};
+                   .prior = std::log(2 * probability_at(returns, match.step))};
   double log_odds = middle && PlaceFilter::is_near(match.step, *middle, loops)
                         ? log_odds_near(*middle, posterior, loops, terms)
                         : log_odds_from_anywhere(posterior, terms);
@@ -302,6 +303,11 @@ double PlaceFilter::geometry_log_ratio(double evidence, std::ptrdiff_t num_steps
          std::max(0.0, growth + std::min(1.0, excess / kFullExcess) * at_beginning);
 }
 
+double PlaceFilter::probability_alone(double evidence, std::ptrdiff_t num_steps) const {
+  const double ratio = std::min(kMaxLogRatio, geometry_log_ratio(evidence, num_steps));
+  return 1 / (1 + std::exp(-ratio) / from_anywhere(num_steps));
+}
+
 std::vector<PlaceFilter::Observed> PlaceFilter::observe(
     const std::vector<VerifiedCandidate>& verified, std::size_t num_similar,
     std::ptrdiff_t num_steps) const {
@@ -320,18 +326,18 @@ std::vector<PlaceFilter::Observed> PlaceFilter::observe(
   return observed;
 }
 
-PlaceFilter::Update PlaceFilter::update(
-    Belief prior, const std::vector<VerifiedCandidate>& verified, std::size_t num_similar,
-    std::ptrdiff_t num_steps, const KnownLoops& loops,
-    const std::function<bool(std::ptrdiff_t)>& may_be_at) const {
+PlaceFilter::Update PlaceFilter::update(Belief prior,
+                                        const std::vector<VerifiedCandidate>& verified,
+                                        std::size_t num_similar, const Steps& known,
+                                        const KnownLoops& loops) const {
   Update update;
-  update.observed = observe(verified, num_similar, num_steps);
+  update.observed = observe(verified, num_similar, known.number);
   update.has_null = num_similar >= kMinNull;
-  std::erase_if(prior.places, [&](const Hypothesis& h) { return !may_be_at(h.step); });
+  std::erase_if(prior.places, [&](const Hypothesis& h) { return !known.may_be_at(h.step); });
   std::vector<std::ptrdiff_t> steps;
   steps.reserve(update.observed.size());
   for (const Observed& o : update.observed) steps.push_back(o.step);
-  update.returns = returns_to(std::move(steps), num_steps);
+  update.returns = returns_to(std::move(steps), known.number, known.return_weight);
   add_returns(update.returns, prior);
   share_among_laps(loops, prior.places);
 
@@ -358,9 +364,9 @@ PlaceFilter::Update PlaceFilter::update(
   });
   update.prior = std::move(prior);
   const auto middle = update.belief.peak();
-  update.match = choose_match(middle, num_steps, loops, update);
+  update.match = choose_match(middle, loops, update);
   if (update.match) {
-    update.terms = explain(middle, {update.belief.places, elsewhere}, num_steps, loops,
+    update.terms = explain(middle, {update.belief.places, elsewhere}, update.returns, loops,
                            update.observed[*update.match]);
     update.probability = rounded(1 / (1 + std::exp(-update.terms.sum())));
   }

@@ -89,12 +89,21 @@ class PlaceFilter {
   static std::vector<std::ptrdiff_t> likeliest(const Belief& belief, double min_probability,
                                                std::size_t most);
 
-  /// `verified`: the candidates of the frame; the first `num_similar` look most alike. `num_steps`:
-  /// changes of view that may be candidates. `may_be_at(step)`: false for steps that are excluded.
+  /// What is known of steps before the frame is seen.
+  struct Steps {
+    std::ptrdiff_t number = 0;                            ///< of those that may be candidates
+    std::function<bool(std::ptrdiff_t)> may_be_at;        ///< false for those that are excluded
+    std::function<double(std::ptrdiff_t)> return_weight;  ///< see returns_to()
+  };
+
+  /// `verified`: the candidates of the frame; the first `num_similar` look most alike.
   [[nodiscard]] Update update(Belief prior, const std::vector<VerifiedCandidate>& verified,
-                              std::size_t num_similar, std::ptrdiff_t num_steps,
-                              const KnownLoops& loops,
-                              const std::function<bool(std::ptrdiff_t)>& may_be_at) const;
+                              std::size_t num_similar, const Steps& known,
+                              const KnownLoops& loops) const;
+
+  /// The probability that a place is right which shows so much `evidence`, see CandidateGeometry,
+  /// if nothing else is known.
+  [[nodiscard]] double probability_alone(double evidence, std::ptrdiff_t num_steps) const;
 
   /// What commit() changes.
   struct Next {

@@ -77,24 +77,27 @@ OdometryTrack::OdometryTrack(const OdometryDrift& drift) : drift_(drift) {
   validate(drift, "odometry");
 }
 
-void OdometryTrack::add(const std::optional<OdometryPose>& pose) {
+OdometryTrack::Frame OdometryTrack::next(const std::optional<OdometryPose>& pose) const {
   Frame frame;
   if (last_) frame.path_m = last_->path_m;
-  if (pose) {
-    check_odometry(*pose, fmt::format("The odometry of frame {}", frames_.size()));
-    frame.is_known = true;
-    frame.pose = pose->T_odometry_camera;
-    if (last_) {
-      const cv::Matx44d step = rigid::inverse(last_->pose) * frame.pose;
-      const cv::Matx66d adjoint = rigid::adjoint(frame.pose);
-      const cv::Matx66d covariance =
-          pose->covariance ? *pose->covariance : drift_covariance(step, drift_);
-      frame.path_m += cv::norm(rigid::translation(step));
-      frame.drift = last_->drift + adjoint * covariance * adjoint.t();
-    }
-    last_ = frame;
-  }
+  if (!pose) return frame;
+  check_odometry(*pose, fmt::format("The odometry of frame {}", frames_.size()));
+  frame.is_known = true;
+  frame.pose = pose->T_odometry_camera;
+  if (!last_) return frame;
+  const cv::Matx44d step = rigid::inverse(last_->pose) * frame.pose;
+  const cv::Matx66d adjoint = rigid::adjoint(frame.pose);
+  const cv::Matx66d covariance =
+      pose->covariance ? *pose->covariance : drift_covariance(step, drift_);
+  frame.path_m += cv::norm(rigid::translation(step));
+  frame.drift = last_->drift + adjoint * covariance * adjoint.t();
+  return frame;
+}
+
+void OdometryTrack::add(const std::optional<OdometryPose>& pose) {
+  const Frame frame = next(pose);
   frames_.push_back(frame);
+  if (pose) last_ = frame;
 }
 
 void OdometryTrack::reserve_next() {
@@ -102,13 +105,18 @@ void OdometryTrack::reserve_next() {
 }
 
 std::optional<Motion> OdometryTrack::between(int from, int to) const {
-  const Frame& a = frames_.at(static_cast<std::size_t>(from));
   const Frame& b = frames_.at(static_cast<std::size_t>(to));
-  if (!a.is_known || !b.is_known) return std::nullopt;
-  const cv::Matx44d back = rigid::inverse(b.pose);
+  auto motion = to_next(from, b);
+  if (motion && to < from) motion->covariance *= -1;  // of the drift since `to`
+  return motion;
+}
+
+std::optional<Motion> OdometryTrack::to_next(int from, const Frame& next) const {
+  const Frame& a = frames_.at(static_cast<std::size_t>(from));
+  if (!a.is_known || !next.is_known) return std::nullopt;
+  const cv::Matx44d back = rigid::inverse(next.pose);
   const cv::Matx66d adjoint = rigid::adjoint(back);
-  const cv::Matx66d drift = from < to ? b.drift - a.drift : a.drift - b.drift;
-  return Motion{rigid::inverse(a.pose) * b.pose, adjoint * drift * adjoint.t()};
+  return Motion{rigid::inverse(a.pose) * next.pose, adjoint * (next.drift - a.drift) * adjoint.t()};
 }
 
 double OdometryTrack::path_m(int frame) const {

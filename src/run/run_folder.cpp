@@ -234,7 +234,10 @@ std::string RunFolder::evidence_path() const { return (fs::path(path_) / kEviden
 void RunFolder::write_record(const RunRecord& record) {
   RunRecord whole = record;
   whole.machine = this_machine();
-  if (record.stopped_by != kRunning) whole.results = run_results(detections_, record.wall_s);
+  if (record.stopped_by != kRunning) {
+    whole.results = run_results(detections_, record.wall_s);
+    whole.odometry_doubt = odometry_doubt(detections_);
+  }
   std::string text = to_json(whole) + '\n';
   if (record.stopped_by == kRunning) text.append(kRoomForTheEnd - 1, ' ').push_back('\n');
   const fs::path file = fs::path(path_) / kRecordFile;

@@ -78,6 +78,7 @@ void transfer(Io& io, Record& record) {
   io.unless(0, "/map/session", record.map_session);
   io.unless(std::string(), "/camera", record.camera);
   io.unless(std::string(), "/odometry", record.odometry);
+  io.unless(std::string(), "/odometry_doubt", record.odometry_doubt);
   io.unless(std::string(), "/truth", record.truth);
   io.unless(1, "/truth_every", record.truth_every, 1);
   if (record.results) transfer_results(io, record, *record.results);
@@ -106,6 +107,18 @@ RunRecord run_record_from_json(const std::string& json, const std::string& file)
   if (reader.find("/score")) record.score.emplace();
   transfer(reader, record);
   return record;
+}
+
+std::string odometry_doubt(const std::vector<Detection>& detections) {
+  constexpr std::ptrdiff_t kLeast = 10;
+  const auto against = std::ranges::count(detections, Status::unreachable, &Detection::status);
+  const auto in_favour = std::ranges::count(detections, Status::loop, &Detection::status);
+  if (against < kLeast || against <= in_favour) return "";
+  return fmt::format(
+      "Odometry may be wrong: {} frames show a place that is out of reach by odometry, and only {} "
+      "one in reach. If places do not look alike here, check its scale, axes and times, and look "
+      "for jumps; compare with a run without it.",
+      against, in_favour);
 }
 
 double total_ms(const StepTimes& times) {

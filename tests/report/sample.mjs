@@ -33,6 +33,7 @@ const kStatuses = [
   "no_geometry",
   "low_score",
   "ambiguous",
+  "unreachable",
   "unreadable",
 ];
 const kSteps = ["content", "retrieval", "features", "verification"];

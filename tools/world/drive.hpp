@@ -15,6 +15,8 @@ class Drive {
   Drive(const WorldOptions& options, const Circuit& circuit);
 
   [[nodiscard]] int lap(int frame) const;
+  /// Above the lowest floor.
+  [[nodiscard]] double height_m(int frame) const;
   [[nodiscard]] double driven_m(int frame) const { return frame * spacing_m_; }
   [[nodiscard]] bool blank(int frame) const;
   [[nodiscard]] StreetPoint camera(int frame) const;
@@ -27,14 +29,18 @@ class Drive {
   [[nodiscard]] StreetPoint ahead(int frame, double ahead_m, double left_m) const;
 
  private:
+  [[nodiscard]] int floor(int frame) const;
+  [[nodiscard]] double on_floor_m(int frame) const;
   [[nodiscard]] double along_m(int frame) const;
   [[nodiscard]] bool reversed(int frame) const { return reverse_second_ && lap(frame) == 1; }
-  [[nodiscard]] double left_m(int lap, bool reversed, double driven_m) const;
+  [[nodiscard]] double line_m(int frame, double ahead_m) const;
 
   const Circuit& circuit_;
   std::uint32_t seed_;
   double spacing_m_;
   double lateral_offset_m_;
+  int floors_;
+  double floor_m_;  ///< driven on each floor
   bool reverse_second_;
 };
 

@@ -45,6 +45,7 @@ class Squares {
 bool same_place(const View& a, const View& b, const PlaceRule& rule) {
   const Vec2 apart = a.at - b.at;
   if (dot(apart, apart) > rule.distance_m * rule.distance_m) return false;
+  if (std::abs(a.height_m - b.height_m) > rule.height_m) return false;
   const double cos_turn = dot(a.forward, b.forward);
   return (rule.opposite ? std::abs(cos_turn) : cos_turn) >= rule.cos_turn;
 }

@@ -37,6 +37,8 @@ constexpr double kNodFrames = 3.0;  // between two nods
 constexpr double kDrivenBetween_m = 50.0;
 constexpr double kCosSame = 0.8660254037844386;  // 30 degrees
 constexpr double kCosNear = 0.5;                 // 60 degrees
+constexpr double kSameHeight_m = 1.0;
+constexpr double kNearHeight_m = 2.5;  // less than a storey
 constexpr double kFramesPerSecond = 10.0;
 constexpr double kRadPerDeg = std::numbers::pi / 180;
 
@@ -62,9 +64,15 @@ WorldOptions checked(const WorldOptions& options) {
                             "which is {}.",
                             options.near_place_m, options.same_place_m));
   }
-  const double circuit_m = options.frames * options.spacing_m / options.laps;
+  if (options.floors > 1 && options.reverse_second_lap) {
+    throw Error(ErrorKind::option,
+                fmt::format("world.floors is {}, but must be 1 with world.reverse_second_lap.",
+                            options.floors));
+  }
+  const double laps = options.laps * options.floors;
+  const double circuit_m = options.frames * options.spacing_m / laps;
   if (circuit_m >= Circuit::kShortestCircuit_m) return options;
-  const double drive_m = Circuit::kShortestCircuit_m * options.laps;
+  const double drive_m = Circuit::kShortestCircuit_m * laps;
   const double least_spacing_m = std::ceil(drive_m / options.frames * 100) / 100;
   const bool may_be_set = least_spacing_m <= largest_spacing_m();
   throw Error(
@@ -72,7 +80,7 @@ WorldOptions checked(const WorldOptions& options) {
       fmt::format(
           "world: {} frames {} m apart in {} laps make a circuit of {:.0f} m, but "
           "the shortest has {} m: take {:.0f} frames or more{}.",
-          options.frames, options.spacing_m, options.laps, circuit_m, Circuit::kShortestCircuit_m,
+          options.frames, options.spacing_m, laps, circuit_m, Circuit::kShortestCircuit_m,
           std::ceil(drive_m / options.spacing_m),
           may_be_set ? fmt::format(", or set spacing_m to {:.2f} or more", least_spacing_m) : ""));
 }
@@ -104,7 +112,8 @@ struct World::Plan {
   explicit Plan(const WorldOptions& wanted)
       : options(checked(wanted)),
         seed(scramble(static_cast<std::uint32_t>(options.seed))),
-        circuit(seed, options.frames * options.spacing_m / options.laps, options.blank_stretch),
+        circuit(seed, options.frames * options.spacing_m / (options.laps * options.floors),
+                options.blank_stretch),
         drive(options, circuit),
         town(seed, circuit, options.look_alike),
         traffic(seed, circuit, drive, options.moving_objects) {}
@@ -120,7 +129,7 @@ struct World::Plan {
     return drive.lap(frame) > 0 ? static_cast<float>(factor) : 0.0F;
   }
   [[nodiscard]] std::vector<View> views() const;
-  [[nodiscard]] PlaceRule rule(double distance_m, double cos_turn) const;
+  [[nodiscard]] PlaceRule rule(double distance_m, double cos_turn, double height_m) const;
   void draw(int frame, const Camera& camera, FisheyeLens::Image& columns) const;
   void store(int frame, int column, const std::vector<Color>& rows, cv::Mat& image) const;
 
@@ -161,14 +170,14 @@ std::vector<View> World::Plan::views() const {
   views.reserve(static_cast<std::size_t>(options.frames));
   for (int frame = 0; frame < options.frames; ++frame) {
     const Camera at = camera(frame);
-    views.push_back({at.eye, at.forward});
+    views.push_back({at.eye, at.forward, drive.height_m(frame)});
   }
   return views;
 }
 
-PlaceRule World::Plan::rule(double distance_m, double cos_turn) const {
+PlaceRule World::Plan::rule(double distance_m, double cos_turn, double height_m) const {
   return {distance_m, cos_turn, options.opposite_counts,
-          static_cast<int>(std::ceil(kDrivenBetween_m / options.spacing_m))};
+          static_cast<int>(std::ceil(kDrivenBetween_m / options.spacing_m)), height_m};
 }
 
 /// What a pinhole camera at a place of `frame` sees: columns, of rows.
@@ -220,7 +229,7 @@ int World::lap(int frame) const {
 Pose World::pose(int frame) const {
   assert(frame >= 0 && frame < options().frames);
   const StreetPoint at = plan_->drive.camera(frame);
-  return {at.at.x, at.at.y, wrap_angle(at.heading_rad)};
+  return {at.at.x, at.at.y, plan_->drive.height_m(frame), wrap_angle(at.heading_rad)};
 }
 
 bool World::blank(int frame) const {
@@ -249,7 +258,7 @@ cv::Matx44d World::T_world_camera(int frame) const {
   const Camera camera = plan_->camera(frame);
   const Vec2 ahead = camera.forward;
   const Vec2 right = left_of(ahead) * -1.0;
-  return {right.x, 0, ahead.x, camera.eye.x, 0, 1, 0, -camera.eye_m,
+  return {right.x, 0, ahead.x, camera.eye.x, 0, 1, 0, -camera.eye_m - plan_->drive.height_m(frame),
           right.y, 0, ahead.y, camera.eye.y, 0, 0, 0, 1};
 }
 
@@ -298,11 +307,11 @@ cv::Mat World::render(int frame, double right_m) const {
 double World::time_s(int frame) { return frame / kFramesPerSecond; }
 
 std::vector<PlaceRun> World::same_place() const {
-  return find_places(plan_->views(), plan_->rule(options().same_place_m, kCosSame));
+  return find_places(plan_->views(), plan_->rule(options().same_place_m, kCosSame, kSameHeight_m));
 }
 
 std::vector<PlaceRun> World::near_place() const {
-  return find_places(plan_->views(), plan_->rule(options().near_place_m, kCosNear));
+  return find_places(plan_->views(), plan_->rule(options().near_place_m, kCosNear, kNearHeight_m));
 }
 
 std::size_t World::storage_bytes() const noexcept {

@@ -81,8 +81,21 @@ void write_image(const fs::path& path, const cv::Mat& image) {
 std::string kitti_row(const Pose& pose) {
   const double c = std::cos(pose.heading_rad);
   const double s = std::sin(pose.heading_rad);
-  return fmt::format("{:.9f} 0 {:.9f} {:.6f} 0 1 0 0 {:.9f} 0 {:.9f} {:.6f}\n", s, c, pose.x_m, -c,
-                     s, pose.y_m);
+  return fmt::format("{:.9f} 0 {:.9f} {:.6f} 0 1 0 {:.6f} {:.9f} 0 {:.9f} {:.6f}\n", s, c, pose.x_m,
+                     0.0 - pose.z_m, -c, s, pose.y_m);
+}
+
+/// TUM with covariance. The camera turns about its y axis alone.
+std::string odometry_row(double time_s, const OdometryPose& pose) {
+  const cv::Matx44d& at = pose.T_odometry_camera;
+  const double half_turn = std::atan2(at(0, 2), at(2, 2)) / 2;
+  std::string row = fmt::format("{:.6f} {:.6f} {:.6f} {:.6f} 0 {:.9f} 0 {:.9f}", time_s, at(0, 3),
+                                at(1, 3), at(2, 3), std::sin(half_turn), std::cos(half_turn));
+  const cv::Matx66d covariance = pose.covariance.value_or(cv::Matx66d::zeros());
+  for (int i = 0; i < 6; ++i) {
+    for (int j = i; j < 6; ++j) row += fmt::format(" {:.6g}", covariance(i, j));
+  }
+  return row + '\n';
 }
 
 /// That of the whole drive: the nods of single frames are left out.
@@ -121,6 +134,10 @@ void write_dataset(const World& world, const std::string& folder,
   write_rows(root / "times.txt", frames,
              [&](int frame) { return fmt::format("{:.6f}\n", World::time_s(frame)); });
   write_rows(root / "poses.txt", frames, [&](int frame) { return kitti_row(world.pose(frame)); });
+  const std::vector<OdometryPose> odometry = drifting_odometry(world);
+  write_rows(root / "odometry.txt", frames, [&](int frame) {
+    return odometry_row(World::time_s(frame), odometry[static_cast<std::size_t>(frame)]);
+  });
   write_file((root / "camera.yaml").string(), to_camera_info(mean_camera(world)));
   write_place_runs(root / "truth.csv", "query, first and last true earlier frame",
                    world.same_place());

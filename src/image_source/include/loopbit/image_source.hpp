@@ -52,6 +52,7 @@ inline constexpr int kMaxMegapixels = 100;
 /// Opens a sequence. Its kind is detected:
 ///  - `camera:N`: a camera attached to this machine (N from 0 to 99), no times;
 ///  - a folder with `image_0` or `image_2`: a KITTI odometry sequence (times.txt if present);
+///  - a folder with `images` and `times.txt` (seconds, one per image), as `loopbit demo` writes it;
 ///  - a folder with `mav0/cam0/data.csv`, or that `mav0` or `cam0` itself: EuRoC;
 ///  - a folder with `rgb.txt`: TUM RGB-D;
 ///  - any other folder: its images in natural order (2.png before 10.png), told by extension;

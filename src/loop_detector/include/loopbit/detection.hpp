@@ -22,12 +22,14 @@ enum class Status {
   no_geometry,       ///< no epipolar geometry explains enough of the matches
   low_score,         ///< the evidence is too weak to accept the match
   ambiguous,         ///< enough evidence, but similar-looking places share it
+  unreachable,       ///< evidence of a place where the robot cannot be, by odometry
   unreadable,        ///< no usable image
 };
 
 inline constexpr std::array kAllStatuses{
-    Status::loop,        Status::no_earlier_place, Status::no_similar_place, Status::few_matches,
-    Status::no_geometry, Status::low_score,        Status::ambiguous,        Status::unreadable};
+    Status::loop,        Status::no_earlier_place, Status::no_similar_place,
+    Status::few_matches, Status::no_geometry,      Status::low_score,
+    Status::ambiguous,   Status::unreachable,      Status::unreadable};
 
 /// The enumerator's name, as in loops.csv: "loop", "no_earlier_place", ...
 std::string_view to_string(Status status);

@@ -45,6 +45,8 @@ struct ExclusionOptions {
 struct DecisionOptions {
   double min_score = 0.98;
   bool count_matches = false;
+  double reach_m = 6.0;
+  double reach_up_m = 1.0;
 
   static constexpr auto fields() {
     using S = DecisionOptions;
@@ -54,7 +56,11 @@ struct DecisionOptions {
               "wrong loop costs as much as 49 missed ones"},
         switch_field("count_matches", &S::count_matches,
                      "the score is the number of matches, without geometry or frames before, as in "
-                     "the paper")};
+                     "the paper"),
+        Field{"reach_m", &S::reach_m, 0.1, 1e6,
+              "with odometry: two views of one place are at most this far apart, m"},
+        Field{"reach_up_m", &S::reach_up_m, 0.1, 1e6,
+              "with odometry: the same upwards in the image; storeys are 3 m apart"}};
   }
 };
 

@@ -68,6 +68,17 @@ class OdometryTrack {
   /// Throws Error (kind option) if `drift` is not valid.
   explicit OdometryTrack(const OdometryDrift& drift = {});
 
+  /// A frame of the track.
+  struct Frame {
+    bool is_known = false;
+    cv::Matx44d pose = cv::Matx44d::eye();
+    double path_m = 0;
+    cv::Matx66d drift = cv::Matx66d::zeros();  ///< sum over all steps, in the frame of odometry
+  };
+
+  /// What add() would add. Throws Error (kind input), see check_odometry().
+  [[nodiscard]] Frame next(const std::optional<OdometryPose>& pose) const;
+
   /// Adds the next frame. None: its odometry is not known. Throws Error (kind input), see
   /// check_odometry(); the track is then unchanged.
   void add(const std::optional<OdometryPose>& pose);
@@ -79,6 +90,9 @@ class OdometryTrack {
   /// adds up the drift of all steps between them. Constant time.
   [[nodiscard]] std::optional<Motion> between(int from, int to) const;
 
+  /// The same to a frame that next() gave.
+  [[nodiscard]] std::optional<Motion> to_next(int from, const Frame& next) const;
+
   /// Distance driven until `frame`, in metres. At a frame without odometry, that of the last frame
   /// with it.
   [[nodiscard]] double path_m(int frame) const;
@@ -87,13 +101,6 @@ class OdometryTrack {
   [[nodiscard]] int size() const { return static_cast<int>(frames_.size()); }
 
  private:
-  struct Frame {
-    bool is_known = false;
-    cv::Matx44d pose = cv::Matx44d::eye();
-    double path_m = 0;
-    cv::Matx66d drift = cv::Matx66d::zeros();  ///< sum over all steps, in the frame of odometry
-  };
-
   OdometryDrift drift_;
   std::vector<Frame> frames_;
   std::optional<Frame> last_;  ///< with odometry

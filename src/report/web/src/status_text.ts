@@ -17,6 +17,8 @@ const kMeanings: Record<string, string> = {
     "A geometry was found, but with too little evidence. It is a new place, or the overlap is too small.",
   ambiguous:
     "The evidence is strong enough, but other places share it. Look-alike places cannot be told apart.",
+  unreachable:
+    "The evidence is strong enough, but by odometry the robot cannot be there: a place that looks alike, or odometry is wrong.",
   unreadable: "The image is damaged, too small, or not an image.",
 };
 

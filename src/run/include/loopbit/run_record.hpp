@@ -63,8 +63,10 @@ struct RunRecord {
   std::string early_end = {};  ///< of the input, see ImageSource
   std::string camera = {};     ///< calibration that measured relative poses; empty = none
   std::string odometry = {};   ///< its file; empty = none
-  std::string truth = {};      ///< description of the truth, for people
-  int truth_every = 1;         ///< see GroundTruth::every
+  /// A sentence, if most loops contradict the odometry; see odometry_doubt().
+  std::string odometry_doubt = {};
+  std::string truth = {};                          ///< description of the truth, for people
+  int truth_every = 1;                             ///< see GroundTruth::every
   std::optional<Evaluation> score = std::nullopt;  ///< read without its lists
   std::string version = kVersion;                  ///< of the loopbit that wrote it
   Machine machine = {};
@@ -73,6 +75,10 @@ struct RunRecord {
   /// Whether the run came to its end, or was interrupted in order.
   [[nodiscard]] bool has_ended() const { return stopped_by == "end" || stopped_by == "interrupt"; }
 };
+
+/// Why the odometry may be wrong: a sentence if more frames show a place that is out of reach by
+/// odometry than one that is in reach. Empty otherwise.
+std::string odometry_doubt(const std::vector<Detection>& detections);
 
 /// Total time of all steps.
 double total_ms(const StepTimes& times);

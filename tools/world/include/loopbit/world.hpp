@@ -14,13 +14,15 @@
 #include "loopbit/camera.hpp"
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/image_source.hpp"
+#include "loopbit/odometry.hpp"
 #include "loopbit/options.hpp"
 
 namespace loopbit {
 
 /// The built-in world: a camera drives through a town on one closed circuit. The length of the
-/// circuit follows from frames, spacing_m and laps: a ring around one block, or many kilometres
-/// through the town. It never crosses itself.
+/// circuit follows from frames, spacing_m, laps and floors: a ring around one block, or many
+/// kilometres through the town. It never crosses itself. With floors, the drive goes on in a second
+/// town that stands on the first one and looks the same, and so on, up a ramp each time.
 struct WorldOptions {
   int frames = 400;
   int seed = 1;
@@ -28,6 +30,7 @@ struct WorldOptions {
   int height_px = 480;
   double fisheye_deg = 0.0;
   double laps = 2.25;
+  int floors = 1;
   double spacing_m = 0.9;
   double lateral_offset_m = 1.0;
   double light_change = 0.6;
@@ -53,7 +56,10 @@ struct WorldOptions {
         Field{"fisheye_deg", &W::fisheye_deg, 0.0, 170.0,
               "Degrees that an equidistant lens sees across the width; beyond 80 degrees from its "
               "axis the image is black (0 = no such lens)"},
-        Field{"laps", &W::laps, 1.0, 1000.0, "Number of laps"},
+        Field{"laps", &W::laps, 1.0, 1000.0, "Number of laps, on each floor"},
+        Field{
+            "floors", &W::floors, 1, 100,
+            "Storeys of 3 m with the same streets and houses; a ramp leads from each to the next"},
         Field{"spacing_m", &W::spacing_m, 0.02, 20.0,
               "Distance driven between two frames (0.1 s), m"},
         Field{"lateral_offset_m", &W::lateral_offset_m, 0.0, 3.0,
@@ -85,10 +91,12 @@ struct WorldOptions {
   }
 };
 
-/// Position and heading of the camera: x east, y north, heading from east to north in (-pi, pi].
+/// Position and heading of the camera: x east, y north, z up from its height on the lowest floor,
+/// heading from east to north in (-pi, pi].
 struct Pose {
   double x_m = 0.0;
   double y_m = 0.0;
+  double z_m = 0.0;
   double heading_rad = 0.0;
 };
 
@@ -120,7 +128,8 @@ class World {
 
   /// The camera of `frame`. It is level, and its nods shift the principal point.
   [[nodiscard]] CameraModel camera(int frame) const;
-  /// From the frame of the camera to the world: x east, y down, z north, the ground at y = 0.
+  /// From the frame of the camera to the world: x east, y down, z north, the ground of the
+  /// lowest floor at y = 0.
   [[nodiscard]] cv::Matx44d T_world_camera(int frame) const;
 
   /// The camera image: BGR, 8 bits per channel. About 25 ms on one core for 640 x 480, and
@@ -133,14 +142,14 @@ class World {
   [[nodiscard]] cv::Mat1f depth_m(int frame) const;
 
   /// All pairs of frames that show the same place: camera centres at most same_place_m apart,
-  /// headings at most 30 degrees apart (or 30 degrees from opposite, if opposite_counts), and at
-  /// least 50 m driven in between, so that the view just passed is not a revisit. Sorted by query,
-  /// then first; the runs of a query neither touch nor overlap. The time is linear in the frames
-  /// for a given number of laps; the same holds for near_place().
+  /// headings at most 30 degrees apart (or 30 degrees from opposite, if opposite_counts), heights
+  /// at most 1 m apart, and at least 50 m driven in between, so that the view just passed is not a
+  /// revisit. Sorted by query, then first; the runs of a query neither touch nor overlap. The time
+  /// is linear in the frames for a given number of laps; the same holds for near_place().
   [[nodiscard]] std::vector<PlaceRun> same_place() const;
 
-  /// All pairs of frames whose match is not wrong: as same_place(), but at most near_place_m and 60
-  /// degrees apart. Contains same_place().
+  /// All pairs of frames whose match is not wrong: as same_place(), but at most near_place_m, 60
+  /// degrees and 2.5 m of height apart. Contains same_place().
   [[nodiscard]] std::vector<PlaceRun> near_place() const;
 
   /// Heap memory in bytes. It grows with the circuit, not with the frames.
@@ -154,9 +163,16 @@ class World {
 /// The drive as a sequence of images, 10 frames per second.
 std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world);
 
+/// The drive by odometry, one pose per frame, from that of the first: per metre driven, the
+/// position drifts by 1 % and the heading by 0.1 degrees (standard deviations of errors that stay
+/// the same for 10 m). Roll, pitch and the height of the camera's horizon do not drift, as with an
+/// inertial sensor; the covariances say so. The same world has the same odometry.
+std::vector<OdometryPose> drifting_odometry(const World& world);
+
 /// Writes the whole drive as a data set: images/000000.png ..., times.txt (seconds), poses.txt
-/// (KITTI: camera to world, 3 x 4 numbers per row, x right, y down, z forward), camera.yaml (see
-/// read_cameras(); without the nods of single frames), truth.csv and not_false.csv. Calls
+/// (KITTI: camera to world, 3 x 4 numbers per row, x right, y down, z forward), odometry.txt (of
+/// drifting_odometry(), TUM with covariances), camera.yaml (see read_cameras(); without the nods of
+/// single frames), truth.csv and not_false.csv. Calls
 /// `on_frame(n)` after each image. Throws Error (kind output) if `folder` already contains images
 /// or cannot be written.
 void write_dataset(
