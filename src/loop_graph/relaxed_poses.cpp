@@ -15,7 +15,8 @@ using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 /// Normal equations of differences x_to - M x_from = d, in blocks of `size` rows.
 class Differences {
  public:
-  Differences(int count, int size) : size_(size), right_(Columns::Zero(count * size, 3)) {}
+  Differences(int count, int size)
+      : size_(size), right_(Columns::Zero(Eigen::Index{count} * size, 3)) {}
 
   void add(int from, int to, const Eigen::MatrixXd& m, const Eigen::MatrixXd& d, double weight) {
     const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size_, size_);
@@ -27,13 +28,13 @@ class Differences {
     } else {
       put(from, to, -weight * m.transpose());
     }
-    right_.middleRows(to * size_, size_) += weight * d;
-    right_.middleRows(from * size_, size_) -= weight * m.transpose() * d;
+    right_.middleRows(Eigen::Index{to} * size_, size_) += weight * d;
+    right_.middleRows(Eigen::Index{from} * size_, size_) -= weight * m.transpose() * d;
   }
   void fix(int block, const Eigen::MatrixXd& value) {
     constexpr double kWeight = 1e9;
     put(block, block, kWeight * Eigen::MatrixXd::Identity(size_, size_));
-    right_.middleRows(block * size_, size_) += kWeight * value;
+    right_.middleRows(Eigen::Index{block} * size_, size_) += kWeight * value;
   }
   [[nodiscard]] Columns solve() const {
     Eigen::SparseMatrix<double> left(right_.rows(), right_.rows());
@@ -76,7 +77,8 @@ std::vector<Pose> relaxed_poses(int count, std::span<const WeighedMotion> motion
   const Columns columns = rotations.solve();
   std::vector<Pose> poses(static_cast<std::size_t>(count), kIdentity);
   for (int k = 0; k < count; ++k) {
-    const Eigen::Quaterniond q(nearest_rotation(columns.middleRows<3>(3 * k).transpose()));
+    const Eigen::Quaterniond q(
+        nearest_rotation(columns.middleRows<3>(Eigen::Index{3} * k).transpose()));
     Eigen::Map<Eigen::Vector4d>(poses[static_cast<std::size_t>(k)].data() + 3) = q.coeffs();
   }
   Differences positions(count, 1);
