@@ -204,8 +204,9 @@ void GraphImpl::reject_improbable() {
     if (is_supported_[i] || chi2(i) <= loops_[i].limit) continue;
     const auto covariance = known.between(loop.match, loop.query);
     if (!covariance) continue;
-    const Pose T = graph::between(poses_[index(loop.match)], poses_[index(loop.query)]);
-    if (graph::loop_chi2(loop, {T, *covariance}) > limit) loops_[i].verdict = LoopVerdict::outlier;
+    const Pose motion = graph::between(poses_[index(loop.match)], poses_[index(loop.query)]);
+    if (graph::loop_chi2(loop, {motion, *covariance}) > limit)
+      loops_[i].verdict = LoopVerdict::outlier;
   }
 }
 
