@@ -305,7 +305,7 @@ cv::Mat1b with_bonnet(const cv::Mat1b& image, int frame) {
   return picture;
 }
 
-TEST(LoopDetector, NothingIsFoundUnderAMask) {
+TEST(LoopDetector, NothingIsFoundUnderAMaskInRealImages) {
   LOOPBIT_NEEDS_DATA("corridor_loop");
   LoopDetector masked;
   masked.set_mask(bonnet_mask());

@@ -69,6 +69,8 @@ PoseFile::PoseFile(const std::string& folder, const CameraModel& camera, LengthS
 
 void PoseFile::add(const Detection& detection, const LoopDetector& detector) {
   shots_.push_back({detection.name, detection.timestamp_s});
+  track_.add(detection.odometry);
+  has_odometry_ = has_odometry_ || detection.odometry.has_value();
   for (const LateLoop& loop : detection.late_loops) add_loop(loop, detector);
   if (detection.status != Status::loop) return;
   add_loop({.frame = detection.frame,
@@ -96,11 +98,11 @@ RelativePose PoseFile::measured(const LateLoop& loop, const Features& query, con
                                 const LoopDetector& detector) {
   PoseRequest request{.query = {&query, &camera_}, .match = {&match, &camera_}};
   const cv::Mat1f depth_m = depth_of(loop);
-  if (lengths_.depth || lengths_.right || lengths_.odometry) request.match_depth_m = &depth_m;
+  if (lengths_.depth || lengths_.right || has_odometry_) request.match_depth_m = &depth_m;
   Beside beside;
   if (lengths_.right) {
     add_right(loop, beside);
-  } else if (lengths_.odometry && !lengths_.depth) {
+  } else if (has_odometry_ && !lengths_.depth) {
     add_neighbours(loop, detector, beside);
   }
   request.beside = beside.views;

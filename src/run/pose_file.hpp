@@ -20,11 +20,10 @@
 
 namespace loopbit {
 
-/// What gives translations a length; the first that is there is used.
+/// What gives translations a length; the first that is there is used. Without any, odometry does.
 struct LengthSources {
   std::optional<DepthFolder> depth;
   std::optional<RightImages> right;
-  bool odometry = false;  ///< see PoseFile::add_odometry()
 };
 
 /// Writes relative_poses.csv, one row per loop, and what is known of it as relative_poses.g2o and
@@ -34,13 +33,11 @@ class PoseFile {
   /// `camera`: of all images, with their size. Throws Error (kind output).
   PoseFile(const std::string& folder, const CameraModel& camera, LengthSources lengths);
 
-  /// What odometry says at the next frame, before its detection. Without depth and right images,
-  /// the nearest frames before and after a match that are 0.5 m away from it give a length.
-  void add_odometry(const std::optional<OdometryPose>& pose) { track_.add(pose); }
-
   /// Measures the poses of its loops, also late ones, and hands the lines to the system. `detector`
-  /// has the features of both frames. Loops between images of different shapes are left out: they
-  /// cannot be from one camera. Throws Error (kind output), and what features_of() throws.
+  /// has the features of both frames. With odometry, and without depth and right images, the
+  /// nearest frames before and after a match that are 0.5 m away from it give a length. Loops
+  /// between images of different shapes are left out: they cannot be from one camera. Throws Error
+  /// (kind output), and what features_of() throws.
   void add(const Detection& detection, const LoopDetector& detector);
 
  private:
@@ -76,7 +73,8 @@ class PoseFile {
   CameraModel camera_;
   LengthSources lengths_;
   OdometryTrack track_;
-  std::vector<Shot> shots_;  ///< one per frame
+  bool has_odometry_ = false;  ///< at any frame so far
+  std::vector<Shot> shots_;    ///< one per frame
   RelativePoseEstimator estimator_;
   Lines table_;
   Lines graph_;

@@ -138,7 +138,6 @@ LoopDetector make_detector(const RunRequest& request, std::shared_ptr<MapStorage
 /// Throws Error if they do not fit the camera, or there is none.
 LengthSources lengths_of(const RunRequest& request, const std::optional<CameraModel>& camera) {
   LengthSources lengths;
-  lengths.odometry = !request.odometry.empty();
   const std::string& asked = request.depth.empty() ? request.right : request.depth;
   if (asked.empty()) return lengths;
   if (!camera) {
@@ -259,13 +258,7 @@ class RecordedRun {
     }
     if (listener.on_start) listener.on_start(folder_.path());
     FrameOdometry odometry;
-    if (odometry_) {
-      odometry = [&](const Frame& frame) {
-        auto pose = odometry_->next(frame);
-        if (poses) poses->add_odometry(pose);
-        return pose;
-      };
-    }
+    if (odometry_) odometry = [&](const Frame& frame) { return odometry_->next(frame); };
     run(input_, detector, recording, stop, odometry);
     record_.early_end = input_.early_end();
     if (map) map_damage_ = map->damage();
