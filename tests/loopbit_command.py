@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: MIT
 """What the tests of the loopbit command share. A test of it is run as
 
-    NAME_test.py LOOPBIT COMMAND_SERVER [--quick] [unittest arguments]
+    NAME_test.py LOOPBIT [--quick] [unittest arguments]
 
-with the command and a build of command_server.cpp, which runs most calls without loading all libraries
-again. --quick drives in fewer, wider steps, which suits a slow build; what is found is not judged then.
+--quick drives in fewer, wider steps, which suits a slow build; what is found is not judged then. Where
+the environment names a build of command_server.cpp in COMMAND_SERVER, that runs most calls, without
+loading all libraries again.
 """
 
 import atexit
@@ -19,7 +20,6 @@ import tempfile
 import unittest
 
 LOOPBIT = pathlib.Path(sys.argv.pop(1)).resolve()
-SERVER_PROGRAM = sys.argv.pop(1)
 QUICK = "--quick" in sys.argv
 if QUICK:
     sys.argv.remove("--quick")
@@ -45,14 +45,15 @@ class Server:
             return subprocess.CompletedProcess(command, code, stdout.read().decode(), stderr.read().decode())
 
 
-SERVER = Server(SERVER_PROGRAM)
+SERVER = Server(os.environ["COMMAND_SERVER"]) if "COMMAND_SERVER" in os.environ else None
 
 
 def loopbit(*arguments, environment=None, cwd=None, **options):
-    """Runs the command. Options are those of subprocess.run(), for which a process of its own is started."""
+    """Runs the command. Options are those of subprocess.run(), for which a process of its own is started
+    in any case."""
     command = [str(LOOPBIT), *map(str, arguments)]
     environment = environment or {}
-    if not options:
+    if SERVER and not options:
         return SERVER.run(command, cwd or os.getcwd(), environment)
     return subprocess.run(
         command,
