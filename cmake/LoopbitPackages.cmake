@@ -56,7 +56,7 @@ set(CPACK_DEBIAN_GRAPH_DESCRIPTION "${summary}: pose graphs
 set(CPACK_DEBIAN_DATA_PACKAGE_NAME libloopbit-data${abi})
 set(CPACK_DEBIAN_DATA_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}")
 set(CPACK_DEBIAN_DATA_DESCRIPTION "${summary}: data sets, scores, reports
  Reads ground truth, scores loops, and writes reports.")
 
@@ -70,7 +70,7 @@ set(CPACK_DEBIAN_DEV_DESCRIPTION "${summary}: headers
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME loopbit)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-data${abi} ${this}")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "${summary}: the command
  Finds loops in image sequences, scores and shows them.")
 
@@ -79,7 +79,7 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 if(LOOPBIT_BUILD_PYTHON)
   math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
   string(CONCAT CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-         "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-data${abi} ${this}, python3-numpy, "
+         "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, python3-numpy, "
          "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_minor})")
 endif()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS python3-matplotlib)

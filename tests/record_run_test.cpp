@@ -119,6 +119,15 @@ TEST_F(RecordRunTest, LeavesWhatItDetected) {
   EXPECT_EQ(run.record->score->decision.positives, 1);
 }
 
+TEST_F(RecordRunTest, ACorrectionNeedsOdometry) {
+  request_.correct = true;
+  const RunOutcome outcome = run(ThreeViews());
+  ASSERT_TRUE(outcome.fault);
+  EXPECT_NE(std::string(outcome.fault->what()).find("No frame has odometry"), std::string::npos);
+  EXPECT_FALSE(outcome.record.correction);
+  EXPECT_FALSE(std::filesystem::exists(path("run/corrected.tum")));
+}
+
 TEST_F(RecordRunTest, ContinuesAMapAndIsKeptBesideIt) {
   in_map();
   for (int session = 1; session <= 2; ++session) {

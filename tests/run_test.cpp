@@ -22,13 +22,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> lines_of(const std::string& path) {
-  std::ifstream file(path);
-  std::vector<std::string> lines;
-  for (std::string line; std::getline(file, line);) lines.push_back(line);
-  return lines;
-}
-
 RunRecord stopped_by(const std::string& reason) {
   RunRecord record;
   record.stopped_by = reason;
@@ -51,7 +44,7 @@ TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
               .inliers = 21,
               .times = {1.0, 0.5, 12.25, 3.0},
               .name = "left, \"new\"\n/1.png"});
-  EXPECT_EQ(lines_of(path("run/loops.csv")),
+  EXPECT_EQ(test::lines_of(path("run/loops.csv")),
             (std::vector<std::string>{
                 kLoopsHeader,
                 "0,12.500000,no_earlier_place,,0,0.000000,0,0,,,,,,0.png,,0.000,0.000,0.000,0.000",
@@ -69,12 +62,12 @@ TEST_F(RunFolderTest, RowsAreOnDiskAtOnce) {
 
 TEST_F(RunFolderTest, NeverReplacesARunUnasked) {
   RunFolder(path("run"), false).add({.frame = 0, .status = Status::unreadable});
-  const auto before = lines_of(path("run/loops.csv"));
+  const auto before = test::lines_of(path("run/loops.csv"));
   test::expect_error(ErrorKind::output, {path("run"), "--overwrite"},
                      [&] { const RunFolder again(path("run"), false); });
-  EXPECT_EQ(lines_of(path("run/loops.csv")), before);
+  EXPECT_EQ(test::lines_of(path("run/loops.csv")), before);
   const RunFolder replaced(path("run"), true);
-  EXPECT_EQ(lines_of(path("run/loops.csv")), std::vector<std::string>{kLoopsHeader});
+  EXPECT_EQ(test::lines_of(path("run/loops.csv")), std::vector<std::string>{kLoopsHeader});
 }
 
 TEST_F(RunFolderTest, OverwritingKeepsOtherFiles) {
@@ -89,7 +82,7 @@ TEST_F(RunFolderTest, ReplacesNeitherADataSetNorWhatIsRead) {
   const std::string truth = write("truth.csv", "5,1,2\n");
   test::expect_error(ErrorKind::output, {path(""), "truth.csv", "no earlier run"},
                      [&] { const RunFolder over(path(""), true); });
-  EXPECT_EQ(lines_of(truth), std::vector<std::string>{"5,1,2"});
+  EXPECT_EQ(test::lines_of(truth), std::vector<std::string>{"5,1,2"});
   { RunFolder(path("run"), false).write_truth({}); }
   const std::string own = path("run/truth.csv");
   test::expect_error(ErrorKind::output, {own, "is read"}, [&] {
@@ -132,6 +125,10 @@ RunRecord full_record() {
                    .wall_s = 1.5,
                    .arguments = {"run", "images"},
                    .early_end = "The video is cut off.",
+                   .correction = Correction{.keyframes = 21,
+                                            .by_verdict = {0, 4, 3, 2, 1},
+                                            .unjudged = 6,
+                                            .odometry_error_m = 7.5},
                    .truth = "truth.csv",
                    .truth_every = 2,
                    .machine = {"a processor", 7, "avx2", "Linux"},
@@ -160,6 +157,10 @@ TEST(RunRecord, WhatWasWrittenIsRead) {
   EXPECT_FALSE(read.options.surf.upright);
   EXPECT_EQ(read.score->options.protocol, "of old");
   EXPECT_EQ(read.results->frames, 4);
+  EXPECT_EQ(read.correction->kept(), 4);
+  EXPECT_EQ(read.correction->rejected(), 6);
+  EXPECT_EQ(read.correction->odometry_error_m, 7.5);
+  EXPECT_FALSE(read.correction->corrected_error_m);
 }
 
 TEST(RunRecord, ReadsAnotherVersion) {
@@ -284,7 +285,7 @@ TEST_F(RunFolderTest, LateLoopsAreReadWhereTheyWereReported) {
                 .name = "c"});
   }
   EXPECT_EQ(
-      lines_of(path("run/late_loops.csv")),
+      test::lines_of(path("run/late_loops.csv")),
       (std::vector<std::string>{kLateLoopsHeader, "1,withdrawn,0,0.125,0.000000,2,,a\\x2cb.png",
                                 "1,late,0,0.995,0.250000,2,,a\\x2cb.png",
                                 "0,late,2:7,0.99,0.000000,2,a\\x2cb.png,"}));
@@ -301,6 +302,21 @@ TEST_F(RunFolderTest, LateLoopsAreReadWhereTheyWereReported) {
   EXPECT_TRUE(match_list(read).matches[0].is_loop) << "decisions at once stay as they were";
 }
 
+TEST_F(RunFolderTest, LoopsMayBeWithdrawnAfterTheLastFrame) {
+  {
+    RunFolder folder(path("run"), false);
+    folder.add({.frame = 0});
+    folder.add({.frame = 1, .status = Status::loop, .match = 0, .score = 0.99, .name = "b"});
+    folder.withdraw({{.frame = 1, .match = 0}});
+    folder.write_record(stopped_by("end"));
+    EXPECT_EQ(folder.detections()[1].withdrawn_loops.size(), 1U);
+  }
+  EXPECT_EQ(test::lines_of(path("run/late_loops.csv")).back(), "1,withdrawn,0,0,0.000000,1,b,");
+  const FinishedRun run = read_run(path("run"));
+  EXPECT_FALSE(with_changes(match_list(run.detections)).matches[0].is_loop);
+  EXPECT_EQ(run.record->results->withdrawn_loops, 1);
+}
+
 TEST_F(RunFolderTest, AChangedRowOfLateLoopsIsNamed) {
   RunFolder(path("run"), false).add({.frame = 0});
   const auto expect_refused = [&](const std::string& row, std::string_view part) {
@@ -313,6 +329,7 @@ TEST_F(RunFolderTest, AChangedRowOfLateLoopsIsNamed) {
   expect_refused("1,later,0,1,0,2,,", "'later'");
   expect_refused("1,late,1,1,0,2,,", "'1'");
   expect_refused("2,late,0,1,0,2,,", "'2'");
+  expect_refused("3,withdrawn,0,1,0,2,,", "'2'");
   (void)write("run/late_loops.csv", std::string(kLateLoopsHeader) + "\n2,late,0,1,0,9,,\n");
   EXPECT_EQ(read_run(path("run")).detections.size(), 1U) << "its frame did not reach the disk";
 }
@@ -355,11 +372,11 @@ std::size_t frames_in(const std::string& folder) { return read_run(folder).detec
 
 TEST_F(RunFolderTest, ARunWithoutARowReplacesNothing) {
   write_run(path("run"), 3);
-  const auto before = lines_of(path("run/run.json"));
+  const auto before = test::lines_of(path("run/run.json"));
   for (const char* reason : {kRunning, "interrupt", "The disk is full."}) {
     write_run(path("run"), 0, reason);
     EXPECT_EQ(frames_in(path("run")), 3U);
-    EXPECT_EQ(lines_of(path("run/run.json")), before);
+    EXPECT_EQ(test::lines_of(path("run/run.json")), before);
     EXPECT_EQ(std::distance(fs::directory_iterator(path("run")), {}), 3);
   }
 }

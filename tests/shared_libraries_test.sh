@@ -34,8 +34,8 @@ link loopbit_images -lloopbit
 link loopbit_recordings -lloopbit_images -lloopbit_map -lloopbit
 link loopbit_poses -lloopbit -lopencv_calib3d -lyaml-cpp
 link loopbit_graph -lloopbit_poses -lloopbit
-link loopbit_data -lloopbit_poses -lloopbit_images -lloopbit_map -lloopbit
-link loopbit_report -lloopbit_data -lloopbit_poses -lloopbit_images -lloopbit_map -lloopbit
+link loopbit_data -lloopbit_graph -lloopbit_poses -lloopbit_images -lloopbit_map -lloopbit
+link loopbit_report -lloopbit_data -lloopbit_graph -lloopbit_poses -lloopbit_images -lloopbit_map -lloopbit
 
 grep -q '^loopbit::LoopDetector::process(' "$scratch/loopbit.symbols"
 # Of a class with virtual functions, what its users link.

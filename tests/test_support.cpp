@@ -135,6 +135,13 @@ cv::Mat1b with_noise(const cv::Mat1b& image, double sigma, Random& random) {
   return noisy;
 }
 
+std::vector<std::string> lines_of(const std::string& path) {
+  std::ifstream file(path);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(file, line);) lines.push_back(line);
+  return lines;
+}
+
 void expect_error(ErrorKind kind, std::initializer_list<std::string_view> parts,
                   const std::function<void()>& action) {
   try {

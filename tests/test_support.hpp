@@ -10,6 +10,7 @@
 #include <ostream>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
@@ -69,6 +70,9 @@ cv::Mat1b view(int scene, cv::Point moved_px = {0, 0});
 
 /// Adds grey-level noise of the standard deviation `sigma`.
 cv::Mat1b with_noise(const cv::Mat1b& image, double sigma, Random& random);
+
+/// The lines of a text file; none if it cannot be read.
+std::vector<std::string> lines_of(const std::string& path);
 
 /// Expects `action` to throw Error of `kind` whose sentence has all of `parts`.
 void expect_error(ErrorKind kind, std::initializer_list<std::string_view> parts,

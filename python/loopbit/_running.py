@@ -131,6 +131,7 @@ def run_folder(
     depth: Path | None = None,
     depth_scale: float = 5000.0,
     odometry: Path | None = None,
+    correct: bool = False,
     right: Path | None = None,
     baseline_m: float = 0.0,
     keep_images: bool = False,
@@ -163,6 +164,8 @@ def run_folder(
     metre.
     odometry: a file of poses of the camera by odometry: TUM, KITTI, EuRoC, or TUM with covariances.
     options.odometry says how fast it drifts.
+    correct: after the run, corrects the trajectory by a pose graph of odometry and loops, and
+    withdraws the loops that it rejects: corrected.tum, judged_loops.csv and graph.g2o.
     right: a folder with the images of the right camera of a stereo pair, named like the images, in
     place of depth. baseline_m is that of a rectified pair; without it, the calibration in a KITTI or
     EuRoC folder counts, or the second camera of the calibration file.
@@ -196,6 +199,7 @@ def run_folder(
         depth=depth or "",
         depth_scale=depth_scale,
         odometry=odometry or "",
+        correct=correct,
         right=right or "",
         baseline_m=baseline_m,
     ), on_bad_frame)

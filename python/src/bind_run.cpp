@@ -177,7 +177,7 @@ RunRequest request_of(const LoopDetectorOptions& options, const Path& folder, bo
                       const std::optional<GroundTruth>& truth, const Path& poses,
                       const std::optional<PositionRows>& positions_m, const Path& mask,
                       const Path& camera, const Path& depth, double depth_scale,
-                      const Path& odometry, const Path& right, double baseline_m) {
+                      const Path& odometry, bool correct, const Path& right, double baseline_m) {
   const std::string camera_file = camera.string();
   return {.options = options,
           .folder = folder.string(),
@@ -196,6 +196,7 @@ RunRequest request_of(const LoopDetectorOptions& options, const Path& folder, bo
           .depth = depth.string(),
           .depth_scale = depth_scale,
           .odometry = odometry.string(),
+          .correct = correct,
           .right = right.string(),
           .baseline_m = baseline_m};
 }
@@ -206,7 +207,8 @@ void bind_run_folder(py::module_& module) {
            py::arg("overwrite"), py::arg("evidence"), py::arg("map"), py::arg("keep_images"),
            whole("map_cache_mb"), py::arg("scoring"), py::arg("truth"), py::arg("poses"),
            py::arg("positions_m"), py::arg("mask"), py::arg("camera"), py::arg("depth"),
-           py::arg("depth_scale"), py::arg("odometry"), py::arg("right"), py::arg("baseline_m"));
+           py::arg("depth_scale"), py::arg("odometry"), py::arg("correct"), py::arg("right"),
+           py::arg("baseline_m"));
   module.def("_run_folder", &run_folder, py::arg("source"), py::arg("request"),
              py::arg("on_bad_frame"));
 }

@@ -84,6 +84,12 @@ void choose_camera(const RunFlags& flags, SessionFlags& session) {
 
 int run_command(RunFlags& flags, const Arguments& arguments) {
   RunRequest& run = flags.session.run;
+  if (run.correct && run.odometry.empty() && flags.odometry_topic.empty()) {
+    throw Error(
+        ErrorKind::option,
+        "--correct needs odometry: give it by --odometry FILE, or --odometry-topic NAME of a "
+        "recording.");
+  }
   if (run.folder.empty() && run.map.empty()) run.folder = usual_folder(flags);
   run.arguments = arguments;
   run.scoring = flags.truth.scoring;
@@ -131,6 +137,11 @@ void add_motion_flags(CLI::App& command, RunFlags& flags) {
                   "where the camera is on the robot")
       ->type_name("NAME")
       ->excludes(odometry);
+  command.add_flag(
+      "--correct", flags.session.run.correct,
+      "After the run, correct the trajectory by a pose graph of odometry and loops, and "
+      "withdraw the loops that it rejects: writes corrected.tum, graph.g2o, "
+      "judged_loops.csv and trajectory.csv");
   CLI::Option* right =
       command
           .add_option("--right", flags.session.run.right,

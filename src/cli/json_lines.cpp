@@ -71,6 +71,10 @@ void JsonLines::add(const Detection& detection) {
   print_now(line);
 }
 
+void JsonLines::withdraw(const std::vector<LateLoop>& loops) const {
+  print_late("withdrawn", loops, names_);
+}
+
 void JsonLines::finish(const RunOutcome& run, const std::string& report) {
   Line line{{"type", "summary"}, {"folder", run.folder}};
   if (!report.empty()) line["report"] = report;

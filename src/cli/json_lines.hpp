@@ -16,6 +16,9 @@ class JsonLines {
   /// Prints the frame if it is a loop.
   void add(const Detection& detection);
 
+  /// Prints loops that are withdrawn after the last frame.
+  void withdraw(const std::vector<LateLoop>& loops) const;
+
   /// Prints the last line. `report`: its file; may be empty.
   static void finish(const RunOutcome& run, const std::string& report);
 

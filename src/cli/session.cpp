@@ -82,7 +82,11 @@ RunOutcome run_with_progress(RunInput& input, const SessionFlags& flags, LivePag
             progress.advance(detection.status == Status::loop);
             if (flags.json) lines.add(detection);
           },
-      .on_bad_frame = [&](const std::string& sentence) { progress.report(sentence); }};
+      .on_bad_frame = [&](const std::string& sentence) { progress.report(sentence); },
+      .on_rejected =
+          [&](const std::vector<LateLoop>& loops) {
+            if (flags.json) lines.withdraw(loops);
+          }};
   return record_run(input, flags.run, live ? live->beside(listener) : listener, stop);
 }
 

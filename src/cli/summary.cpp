@@ -18,8 +18,8 @@ std::ptrdiff_t count(const std::vector<Detection>& detections, Status status) {
                        [&](const Detection& d) { return d.status == status; });
 }
 
-/// What later frames changed.
-void print_changes(const std::vector<Detection>& detections) {
+/// What later frames changed. `rejected`: withdrawn by the pose graph.
+void print_changes(const std::vector<Detection>& detections, std::size_t rejected) {
   std::size_t late = 0;
   std::size_t withdrawn = 0;
   for (const Detection& d : detections) {
@@ -27,7 +27,33 @@ void print_changes(const std::vector<Detection>& detections) {
     withdrawn += d.withdrawn_loops.size();
   }
   if (late > 0) fmt::print("  {:>9} more found late, once the path was sure\n", late);
-  if (withdrawn > 0) fmt::print("  {:>9} withdrawn by later frames\n", withdrawn);
+  if (withdrawn > rejected) {
+    fmt::print("  {:>9} withdrawn by later frames\n", withdrawn - rejected);
+  }
+}
+
+/// What the pose graph made of the loops, and of the trajectory.
+void print_correction(const Correction& correction, const std::string& folder) {
+  std::string evidence;
+  for (std::size_t i = 0; i < kAllLoopVerdicts.size(); ++i) {
+    const LoopVerdict verdict = kAllLoopVerdicts[i];
+    if (verdict == LoopVerdict::kept || correction.by_verdict[i] == 0) continue;
+    evidence += fmt::format("{}{} {}", evidence.empty() ? " (" : ", ", correction.by_verdict[i],
+                            to_string(verdict));
+  }
+  if (!evidence.empty()) evidence += ')';
+  fmt::print("graph      {} loops kept, {} rejected and withdrawn{}\n", correction.kept(),
+             correction.rejected(), evidence);
+  if (correction.unjudged > 0) {
+    fmt::print("           {} loops of frames without odometry are not judged\n",
+               correction.unjudged);
+  }
+  if (correction.odometry_error_m && correction.corrected_error_m) {
+    fmt::print("           trajectory error: {:.3f} m by odometry, {:.3f} m corrected\n",
+               *correction.odometry_error_m, *correction.corrected_error_m);
+  }
+  fmt::print("           {0}/corrected.tum, {0}/graph.g2o, {0}/judged_loops.csv\n",
+             printable(folder));
 }
 
 /// How often frames that found nothing did so, and what that means, in the order of the steps.
@@ -108,11 +134,13 @@ void print_summary(const RunOutcome& run, const std::string& report) {
   fmt::print("loops      {} frame{} at a place seen before{}\n", loops, loops == 1 ? "" : "s",
              elsewhere == 0 ? "" : fmt::format(", {} in earlier sessions of the map", elsewhere));
   print_revisits(detections);
-  print_changes(detections);
+  const auto& correction = record.correction;
+  print_changes(detections, correction ? static_cast<std::size_t>(correction->rejected()) : 0);
   print_reasons(detections);
   if (const std::string doubt = odometry_doubt(detections); !doubt.empty()) {
     fmt::print("odometry   {}\n", doubt);
   }
+  if (correction) print_correction(*correction, run.folder);
   if (record.score) print_score(*record.score);
   print_times(record, detections);
   fmt::print("written    {0}/loops.csv, {0}/late_loops.csv, {0}/run.json\n", printable(run.folder));

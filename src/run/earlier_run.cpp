@@ -23,9 +23,11 @@ namespace fs = std::filesystem;
 /// All that a run may leave; a run that replaces another may not leave its files beside its own.
 /// Last those that tell a run from a data set, so that a run half removed is still one.
 std::vector<std::string> files_of_a_run() {
-  std::vector<std::string> names{kTruthFile,     kNotFalseFile,  kIgnoreFile,    kUnknownFile,
-                                 kPositionsFile, kPosesFile,     kPoseGraphFile, kMatchedPosesFile,
-                                 kCameraFile,    kLateLoopsFile, kReportFile};
+  std::vector<std::string> names{
+      kTruthFile,       kNotFalseFile,   kIgnoreFile,    kUnknownFile,
+      kPositionsFile,   kPosesFile,      kPoseGraphFile, kMatchedPosesFile,
+      kCameraFile,      kTrajectoryFile, kCorrectedFile, kCorrectedKittiFile,
+      kJudgedLoopsFile, kGraphFile,      kLateLoopsFile, kReportFile};
   for (const char* suffix : kDatabaseSuffixes) {
     names.push_back(std::string(kEvidenceFile) + suffix);
   }

@@ -168,12 +168,14 @@ void read_late_loops(const std::string& path, std::vector<Detection>& detections
                   .similarity = row.number<double>(4)};
     read_match(row, 2, loop);
     const auto reported_at = row.number<std::size_t>(5);
-    if (static_cast<std::size_t>(loop.frame) >= reported_at) row.fail(5);
+    const bool is_late = row.cell(1) == kLate;
+    if (!is_late && row.cell(1) != kWithdrawn) row.fail(1);
+    // A loop of the last frame may be withdrawn in its own name: by the pose graph.
+    if (static_cast<std::size_t>(loop.frame) + (is_late ? 1 : 0) > reported_at) row.fail(5);
     if (loop.match && *loop.match >= loop.frame) row.fail(2);
-    if (row.cell(1) != kLate && row.cell(1) != kWithdrawn) row.fail(1);
     if (reported_at >= detections.size()) return;
     Detection& by = detections[reported_at];
-    (row.cell(1) == kLate ? by.late_loops : by.withdrawn_loops).push_back(loop);
+    (is_late ? by.late_loops : by.withdrawn_loops).push_back(loop);
   });
 }
 

@@ -84,13 +84,17 @@ void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
   const Features match =
       detector.features_of(loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}));
   if (query.working_size_px != match.working_size_px) return;
-  const RelativePose pose = measured(loop, query, match, detector);
+  RelativePose pose = measured(loop, query, match, detector);
   table_.append(csv_row(loop.frame, match_cell(loop), pose));
   add_edge(loop, pose);
-  if (pose.known != PoseKnown::metric) return;
-  const Shot& shot = shots_.at(static_cast<std::size_t>(loop.frame));
-  matched_.append(fmt::format("{:.6f} {}\n", shot.time_s.value_or(static_cast<double>(loop.frame)),
-                              to_tum_pose(pose)));
+  if (pose.known == PoseKnown::metric) {
+    const Shot& shot = shots_.at(static_cast<std::size_t>(loop.frame));
+    matched_.append(fmt::format(
+        "{:.6f} {}\n", shot.time_s.value_or(static_cast<double>(loop.frame)), to_tum_pose(pose)));
+  }
+  const int inliers = static_cast<int>(pose.inliers.size());
+  pose.inliers = {};
+  poses_.push_back({loop.frame, loop.match, std::move(pose), inliers});
 }
 
 /// With an empty depth image where there should be a length, but nothing gives it.

@@ -11,6 +11,7 @@
 
 #include "loopbit/camera.hpp"
 #include "loopbit/detection.hpp"
+#include "loopbit/finished_run.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/odometry.hpp"
 #include "loopbit/relative_pose.hpp"
@@ -39,6 +40,9 @@ class PoseFile {
   /// between images of different shapes are left out: they cannot be from one camera. Throws Error
   /// (kind output), and what features_of() throws.
   void add(const Detection& detection, const LoopDetector& detector);
+
+  /// All that were measured so far, without their inliers.
+  [[nodiscard]] const std::vector<LoopPose>& poses() const { return poses_; }
 
  private:
   void add_loop(const LateLoop& loop, const LoopDetector& detector);
@@ -79,6 +83,7 @@ class PoseFile {
   Lines table_;
   Lines graph_;
   Lines matched_;
+  std::vector<LoopPose> poses_;
   std::set<PlaceId> vertices_;  ///< frames in graph_
 };
 

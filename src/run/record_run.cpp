@@ -22,6 +22,7 @@
 #include "pose_file.hpp"
 #include "run_files.hpp"
 #include "run_folder.hpp"
+#include "run_graph.hpp"
 
 namespace loopbit {
 namespace {
@@ -262,6 +263,7 @@ class RecordedRun {
     run(input_, detector, recording, stop, odometry);
     record_.early_end = input_.early_end();
     if (map) map_damage_ = map->damage();
+    if (poses) poses_ = poses->poses();
     if (evidence) evidence->finish();
     if (map) map->finish();
     if (!stop && are_unreadable(folder_.detections())) {
@@ -271,16 +273,22 @@ class RecordedRun {
     }
   }
 
-  /// Scores the detections, and stores truth and positions. `is_cut_off`: by a stop.
-  void score(bool is_cut_off) {
+  /// Corrects the trajectory, scores the detections, and stores truth and positions. `is_cut_off`:
+  /// by a stop.
+  void score(const RunListener& listener, bool is_cut_off) {
     const std::size_t expected = frames_.times_s.size();
     frames_.times_s = match_list(folder_.detections()).times_s;
     frames_.all = frames_.all && frames_.times_s.size() == expected;
     attempt([&] {
       if (odometry_) odometry_->check_used();
     });
+    std::optional<RunGraph> graph;
+    attempt([&] {
+      if (request_.correct) graph = correct(listener);
+    });
     attempt([&] { write_score(); });
     attempt([&] { write_positions(is_cut_off); });
+    if (graph) record_.correction = graph->results(positions_m_);
   }
 
   /// Writes the final run.json.
@@ -305,6 +313,15 @@ class RecordedRun {
     }
   }
 
+  RunGraph correct(const RunListener& listener) {
+    RunGraph graph(folder_.detections(), poses_, request_.options.odometry);
+    const std::vector<LateLoop> rejected = graph.rejected();
+    folder_.withdraw(rejected);
+    if (listener.on_rejected && !rejected.empty()) listener.on_rejected(rejected);
+    graph.write(folder_.path());
+    return graph;
+  }
+
   void write_score() {
     const auto [truth, evaluation] = request_.scoring.resolve(frames_, {.truth = request_.truth});
     if (!truth) return;
@@ -320,7 +337,9 @@ class RecordedRun {
     check_positions(positions_m, frames_.times_s.size());
     const std::string file = request_.scoring.poses_file(request_.poses);
     if (!positions_m && !file.empty()) positions_m = read_positions(file, frames_);
-    if (positions_m) folder_.write_positions(*positions_m);
+    if (!positions_m) return;
+    folder_.write_positions(*positions_m);
+    positions_m_ = std::move(*positions_m);
   }
 
   RunInput& input_;
@@ -333,6 +352,8 @@ class RecordedRun {
   std::optional<LoopDetector> detector_;
   RunRecord record_;
   RunFolder folder_;
+  std::vector<LoopPose> poses_;  ///< after detect()
+  Positions positions_m_;        ///< after score(); empty if none are known
   std::vector<std::string> map_damage_;
   std::optional<Error> fault_;
 };
@@ -370,7 +391,7 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
     }
     throw;
   }
-  run.score(stop);
+  run.score(listener, stop);
   run.finish(stop ? "interrupt" : "end");
   return std::move(run).outcome();
 }

@@ -26,6 +26,11 @@ inline constexpr const char* kPosesFile = "relative_poses.csv";
 inline constexpr const char* kPoseGraphFile = "relative_poses.g2o";
 inline constexpr const char* kMatchedPosesFile = "matched_poses.tum";
 inline constexpr const char* kCameraFile = "camera.yaml";
+inline constexpr const char* kTrajectoryFile = "trajectory.csv";
+inline constexpr const char* kCorrectedFile = "corrected.tum";
+inline constexpr const char* kCorrectedKittiFile = "corrected.kitti";
+inline constexpr const char* kJudgedLoopsFile = "judged_loops.csv";
+inline constexpr const char* kGraphFile = "graph.g2o";
 inline constexpr const char* kReportFile = "report.html";
 
 /// The folder in a run folder for the run that is being replaced.

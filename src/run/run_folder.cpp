@@ -59,21 +59,18 @@ std::string csv_row(const Detection& d, const std::vector<Detection>& before) {
                      t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
 }
 
-/// Rows of late_loops.csv. `detections`: all until this one.
-std::string late_rows(const Detection& detection, const std::vector<Detection>& detections) {
+/// Rows of late_loops.csv. `detections`: all until the frame that reports them.
+std::string late_rows(const std::vector<LateLoop>& loops, const char* kind,
+                      const std::vector<Detection>& detections) {
   std::string text;
-  const auto add = [&](const std::vector<LateLoop>& loops, const char* kind) {
-    for (const LateLoop& loop : loops) {
-      const auto name_of = [&](std::optional<PlaceId> frame) {
-        return frame ? name_cell(detections.at(static_cast<std::size_t>(*frame)).name) : "";
-      };
-      text += fmt::format("{},{},{},{},{:.6f},{},{},{}\n", loop.frame, kind, match_cell(loop),
-                          loop.score, loop.similarity, detection.frame, name_of(loop.frame),
-                          name_of(loop.match));
-    }
-  };
-  add(detection.withdrawn_loops, kWithdrawn);
-  add(detection.late_loops, kLate);
+  for (const LateLoop& loop : loops) {
+    const auto name_of = [&](std::optional<PlaceId> frame) {
+      return frame ? name_cell(detections.at(static_cast<std::size_t>(*frame)).name) : "";
+    };
+    text += fmt::format("{},{},{},{},{:.6f},{},{},{}\n", loop.frame, kind, match_cell(loop),
+                        loop.score, loop.similarity, detections.back().frame, name_of(loop.frame),
+                        name_of(loop.match));
+  }
   return text;
 }
 
@@ -200,9 +197,18 @@ void RunFolder::add(const Detection& detection) {
   loops_->append(csv_row(detection, detections_), detections_.size());
   detections_.push_back(detection);
   earlier_->leave_aside();
-  const std::string late = late_rows(detection, detections_);
+  const std::string late = late_rows(detection.withdrawn_loops, kWithdrawn, detections_) +
+                           late_rows(detection.late_loops, kLate, detections_);
   if (!late.empty()) late_loops_->append(late, late_rows_);
   late_rows_ += detection.late_loops.size() + detection.withdrawn_loops.size();
+}
+
+void RunFolder::withdraw(const std::vector<LateLoop>& loops) {
+  if (loops.empty()) return;
+  late_loops_->append(late_rows(loops, kWithdrawn, detections_), late_rows_);
+  late_rows_ += loops.size();
+  auto& withdrawn = detections_.back().withdrawn_loops;
+  withdrawn.insert(withdrawn.end(), loops.begin(), loops.end());
 }
 
 void RunFolder::write_truth(const GroundTruth& truth) {

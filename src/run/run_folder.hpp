@@ -38,6 +38,9 @@ class RunFolder {
   /// output) if the disk is full; rows written before are kept.
   void add(const Detection& detection);
 
+  /// Withdraws loops after the last frame, in its name. Throws Error (kind output).
+  void withdraw(const std::vector<LateLoop>& loops);
+
   /// Writes the ground truth, so that the run can be scored and shown again without the original
   /// files: truth.csv, not_false.csv, ignore.csv, unknown.csv, counted in frames of the whole
   /// sequence; see RunRecord::truth_every. Throws Error (kind output).

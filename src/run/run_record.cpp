@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string_view>
 #include <type_traits>
 
@@ -58,6 +59,19 @@ void transfer_results(Io& io, Record& record, Results& results) {
   io("/peak_memory_mib", results.peak_memory_mib);
 }
 
+template <typename Io, typename Correcting>
+void transfer_correction(Io& io, Correcting& correction) {
+  io("/correction/keyframes", correction.keyframes);
+  for (std::size_t i = 0; i < kAllLoopVerdicts.size(); ++i) {
+    if (kAllLoopVerdicts[i] == LoopVerdict::undecided) continue;
+    io(fmt::format("/correction/loops/{}", to_string(kAllLoopVerdicts[i])),
+       correction.by_verdict[i]);
+  }
+  io("/correction/unjudged_loops", correction.unjudged);
+  io.or_null("/correction/odometry_error_m", correction.odometry_error_m);
+  io.or_null("/correction/corrected_error_m", correction.corrected_error_m);
+}
+
 template <typename Io, typename Record>
 void transfer(Io& io, Record& record) {
   io("/loopbit", record.version);
@@ -79,6 +93,7 @@ void transfer(Io& io, Record& record) {
   io.unless(std::string(), "/camera", record.camera);
   io.unless(std::string(), "/odometry", record.odometry);
   io.unless(std::string(), "/odometry_doubt", record.odometry_doubt);
+  if (record.correction) transfer_correction(io, *record.correction);
   io.unless(std::string(), "/truth", record.truth);
   io.unless(1, "/truth_every", record.truth_every, 1);
   if (record.results) transfer_results(io, record, *record.results);
@@ -104,9 +119,16 @@ RunRecord run_record_from_json(const std::string& json, const std::string& file)
   }
   RunRecord record;
   if (reader.find("/counts")) record.results.emplace();
+  if (reader.find("/correction")) record.correction.emplace();
   if (reader.find("/score")) record.score.emplace();
   transfer(reader, record);
   return record;
+}
+
+int Correction::kept() const { return by_verdict[static_cast<std::size_t>(LoopVerdict::kept)]; }
+
+int Correction::rejected() const {
+  return std::accumulate(by_verdict.begin(), by_verdict.end(), -kept());
 }
 
 std::string odometry_doubt(const std::vector<Detection>& detections) {

@@ -54,6 +54,9 @@ struct RunRequest {
   /// A file of camera poses by odometry, as read_trajectory() reads: tells places apart that look
   /// alike, and gives translations a length where there are no depth or right images. Empty = none.
   std::string odometry = {};
+  /// After the run, corrects the trajectory by a pose graph of odometry and loops, and withdraws
+  /// the loops that it rejects.
+  bool correct = false;
   /// A folder with the images of a second camera, named like those of the run, so that translations
   /// get a length. Needs `camera`; excludes `depth`. Empty = none.
   std::string right = {};
@@ -74,8 +77,8 @@ struct RunOutcome {
   std::vector<Detection> detections;
   /// The damage that was found in the map, one clause each. Damaged rows were left out.
   std::vector<std::string> map_damage;
-  /// What turned out to be wrong with the truth, the positions or the odometry. The run is kept
-  /// without them.
+  /// What turned out to be wrong with the truth, the positions, the odometry or its correction. The
+  /// run is kept without them.
   std::optional<Error> fault;
 };
 

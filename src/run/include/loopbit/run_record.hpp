@@ -12,6 +12,7 @@
 #include "loopbit/evaluation.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector_options.hpp"
+#include "loopbit/loop_graph.hpp"
 #include "loopbit/version.hpp"
 
 namespace loopbit {
@@ -46,6 +47,21 @@ struct RunResults {
   double peak_memory_mib = 0;
 };
 
+/// What a pose graph makes of a run's loops and its trajectory.
+struct Correction {
+  int keyframes = 0;  ///< frames with odometry
+  std::array<int, kAllLoopVerdicts.size()>
+      by_verdict{};  ///< loops, in the order of kAllLoopVerdicts
+  int unjudged = 0;  ///< loops of frames without odometry
+  /// With true positions: absolute trajectory error of the odometry and of the corrected
+  /// trajectory.
+  std::optional<double> odometry_error_m = std::nullopt;
+  std::optional<double> corrected_error_m = std::nullopt;
+
+  [[nodiscard]] int kept() const;
+  [[nodiscard]] int rejected() const;
+};
+
 /// Everything in run.json; see docs/run_folder.md.
 struct RunRecord {
   std::string input;        ///< as given by the user
@@ -65,6 +81,7 @@ struct RunRecord {
   std::string odometry = {};   ///< its file; empty = none
   /// A sentence, if most loops contradict the odometry; see odometry_doubt().
   std::string odometry_doubt = {};
+  std::optional<Correction> correction = std::nullopt;
   std::string truth = {};                          ///< description of the truth, for people
   int truth_every = 1;                             ///< see GroundTruth::every
   std::optional<Evaluation> score = std::nullopt;  ///< read without its lists

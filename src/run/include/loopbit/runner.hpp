@@ -7,6 +7,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "loopbit/detection.hpp"
 #include "loopbit/evidence_file.hpp"
@@ -25,6 +26,9 @@ struct RunListener {
   std::function<void(const std::string& folder)> on_start = {};
   /// Optional, called by record_run() only: what it stores of a readable frame, after on_detection.
   std::function<void(const Detection&, const StoredEvidence&)> on_stored = {};
+  /// Optional, called by record_run() only: after the last frame, with the loops that its pose
+  /// graph rejects, if there are any.
+  std::function<void(const std::vector<LateLoop>&)> on_rejected = {};
 };
 
 /// Checks the first usable frame. Throws Error (kind option) if exclusion.seconds is set and the

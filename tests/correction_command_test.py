@@ -1,0 +1,120 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""loopbit run --correct: the corrected trajectory and the loops that the pose graph rejects."""
+
+import csv
+import json
+import unittest
+
+from loopbit_command import QUICK, CommandTest, loopbit
+
+# Two storeys that look the same, a lap and a piece on each.
+STOREYS = ["--frames", 80 if QUICK else 240, "--world", f"spacing_m={4.5 if QUICK else 1.5}", "--world",
+           "floors=2", "--world", "laps=1.3", "--world", "width_px=320", "--world", "height_px=240"]
+# The detector then takes odometry for no reason against a place.
+NO_GATE = ["--set", "decision.reach_m=1000", "--set", "decision.reach_up_m=1000"]
+FILES = ["corrected.kitti", "corrected.tum", "graph.g2o", "judged_loops.csv", "trajectory.csv"]
+
+
+def table(file):
+    with open(file, newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+class CorrectionTest(CommandTest):
+    """All share a drive through two storeys and a run on it, beside the town of other tests."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.storeys = cls.shared / "storeys"
+        made = loopbit("demo", *STOREYS, "--write-images", cls.storeys)
+        assert made.returncode == 0, made.stderr
+        cls.truth = ["--truth", cls.storeys / "truth.csv", "--not-false", cls.storeys / "not_false.csv",
+                     "--poses", cls.storeys / "poses.txt"]
+        cls.corrected = cls.shared / "corrected"
+        cls.ran = loopbit("run", cls.storeys, "--odometry", cls.storeys / "odometry.txt", "--correct",
+                          "--out", cls.corrected, *cls.truth, *NO_GATE, "--no-report", "--json")
+        assert cls.ran.returncode == 0, cls.ran.stderr
+        cls.record = json.loads((cls.corrected / "run.json").read_text())
+        cls.loops = table(cls.corrected / "judged_loops.csv")
+
+    def test_loops_that_odometry_excludes_are_withdrawn(self):
+        counts = self.record["correction"]["loops"]
+        rejected = [(loop["query"], loop["match"]) for loop in self.loops if loop["verdict"] != "kept"]
+        self.assertEqual(len(rejected), counts["unreachable"] + counts["inconsistent"] + counts["outlier"])
+        self.assertGreater(len(rejected), 0)
+        self.assertEqual(counts["kept"], len(self.loops) - len(rejected))
+        last = str(len(table(self.corrected / "loops.csv")) - 1)
+        withdrawn = [(row["frame"], row["match"]) for row in table(self.corrected / "late_loops.csv")
+                     if (row["kind"], row["reported_at"], float(row["score"])) == ("withdrawn", last, 0)]
+        self.assertEqual(withdrawn, rejected)
+        lines = [json.loads(line) for line in self.ran.stdout.splitlines()]
+        told = [(str(line["frame"]), str(line["match"])) for line in lines if line["type"] == "withdrawn"]
+        self.assertEqual(told[-len(rejected):], rejected)
+        self.assertEqual(lines[-1]["run"]["correction"], self.record["correction"])
+
+    @unittest.skipIf(QUICK, "what is found in wider steps is not judged")
+    def test_wrong_loops_go_and_the_trajectory_is_corrected(self):
+        score = self.record["score"]
+        self.assertGreater(score["wrong"], 50, "without the gate, storeys are confused")
+        self.assertLess(score["late"]["wrong"], score["wrong"] / 5)
+        self.assertGreaterEqual(score["late"]["right"], score["right"])
+        correction = self.record["correction"]
+        self.assertLess(correction["corrected_error_m"], 0.6 * correction["odometry_error_m"])
+
+    def test_the_files_agree(self):
+        trajectory = table(self.corrected / "trajectory.csv")
+        frames = len(table(self.corrected / "loops.csv"))
+        self.assertEqual([int(row["frame"]) for row in trajectory], list(range(frames)))
+        tum = [list(map(float, line.split())) for line in
+               (self.corrected / "corrected.tum").read_text().splitlines()[1:]]
+        kitti = [list(map(float, line.split())) for line in
+                 (self.corrected / "corrected.kitti").read_text().splitlines()]
+        times = [float(line) for line in (self.storeys / "times.txt").read_text().split()]
+        for row, time_s, pose, matrix in zip(trajectory, times, tum, kitti, strict=True):
+            self.assertAlmostEqual(pose[0], time_s, delta=1e-6)
+            for axis, name in enumerate(["x_m", "y_m", "z_m"]):
+                self.assertAlmostEqual(pose[1 + axis], float(row[name]), delta=1e-4)
+                self.assertAlmostEqual(matrix[4 * axis + 3], float(row[name]), delta=1e-4)
+        graph = (self.corrected / "graph.g2o").read_text().splitlines()
+        kept = sum(loop["verdict"] == "kept" for loop in self.loops)
+        self.assertEqual(sum(line.startswith("VERTEX_SE3:QUAT ") for line in graph), frames)
+        self.assertEqual(sum(line.startswith("EDGE_SE3:QUAT ") for line in graph), frames - 1 + kept)
+
+    def test_the_summary_says_what_was_kept_and_how_far_off_it_was(self):
+        out = self.scratch / "out"
+        run = ["run", self.storeys, "--out", out, "--overwrite", "--no-report"]
+        ran = loopbit(*run, "--odometry", self.storeys / "odometry.txt", "--correct", *self.truth, *NO_GATE)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        correction = self.record["correction"]
+        kept = correction["loops"]["kept"]
+        self.assertRegex(ran.stdout, rf"graph +{kept} loops kept, {len(self.loops) - kept} rejected and "
+                                     r"withdrawn \(\d+ unreachable")
+        self.assertIn(f"trajectory error: {correction['odometry_error_m']:.3f} m by odometry, "
+                      f"{correction['corrected_error_m']:.3f} m corrected", ran.stdout)
+        for name in FILES:
+            self.assertEqual((out / name).read_bytes(), (self.corrected / name).read_bytes(), name)
+        ran = loopbit(*run, "--limit", 5)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual([name for name in FILES if (out / name).exists()], [], "they were of another run")
+
+    def test_poses_by_row_and_no_camera(self):
+        ran = loopbit("run", self.images, "--odometry", self.dataset / "poses.txt", "--correct", "--no-poses",
+                      "--out", self.out, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertNotIn("trajectory error", ran.stdout)
+        times = [float(line.split()[0]) for line in
+                 (self.out / "corrected.tum").read_text().splitlines()[1:]]
+        self.assertEqual(times, list(range(len(times))), "frames take the place of times")
+        self.assertEqual({loop["known"] for loop in table(self.out / "judged_loops.csv")}, {"nothing"})
+
+    def test_without_odometry_it_is_refused(self):
+        self.assert_fails(loopbit("run", self.storeys, "--correct", "--out", self.out), 2, "--correct",
+                          "--odometry FILE", "--odometry-topic")
+        self.assertFalse(self.out.exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
