@@ -15,6 +15,7 @@ void bind_options(pybind11::module_& module);
 void bind_content(pybind11::module_& module);
 void bind_features(pybind11::module_& module);
 void bind_relative_poses(pybind11::module_& module);
+void bind_graph(pybind11::module_& module);
 void bind_place_index(pybind11::module_& module);
 void bind_map(pybind11::module_& module);
 void bind_map_tools(pybind11::module_& module);

@@ -26,6 +26,7 @@ PYBIND11_MODULE(_loopbit, module) {
   python::bind_content(module);
   python::bind_features(module);
   python::bind_relative_poses(module);
+  python::bind_graph(module);
   python::bind_place_index(module);
   python::bind_map(module);
   python::bind_map_tools(module);
