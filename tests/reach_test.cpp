@@ -11,6 +11,7 @@
 #include "loopbit/loop_detector.hpp"
 
 #include "map_support.hpp"
+#include "shortcuts.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -28,7 +29,9 @@ double chi2_after(double path_m, const OdometryPose& now, const OdometryDrift& d
   for (int metre = 1; metre <= path_m; ++metre) {
     track.add(camera_at(0, 0, std::min<double>(metre, path_m - metre)));
   }
-  return Reach(track, now, {}).chi2(0);
+  const Shortcuts none;
+  SurestPaths paths(track, none, Reach::views_sq({}));
+  return Reach(track, paths, now, {}).chi2(0);
 }
 
 bool is_in_reach(double chi2) { return chi2 <= Reach::kMaxChi2; }
@@ -56,7 +59,102 @@ TEST(ReachTest, DriftWidensIt) {
 TEST(ReachTest, WithoutOdometryEverythingIsInReach) {
   OdometryTrack track;
   track.add(std::nullopt);
-  EXPECT_EQ(Reach(track, camera_at(100, 0, 0), {}).chi2(0), 0);
+  const Shortcuts none;
+  SurestPaths paths(track, none, Reach::views_sq({}));
+  EXPECT_EQ(Reach(track, paths, camera_at(100, 0, 0), {}).chi2(0), 0);
+}
+
+/// Far away and back to the start: a frame per metre, with odometry that keeps its heading.
+struct LongWay {
+  static constexpr int kBack = 200;
+
+  OdometryTrack track;
+  Shortcuts shortcuts;
+  SurestPaths paths = SurestPaths(track, shortcuts, Reach::views_sq({}));
+
+  LongWay() {
+    for (int metre = 0; metre <= kBack; ++metre) {
+      OdometryPose pose = camera_at(0, 0, std::min(metre, kBack - metre));
+      pose.covariance = cv::Matx66d::diag({4e-3, 4e-3, 4e-3, 1e-12, 1e-12, 1e-12});
+      track.add(pose);
+    }
+  }
+
+  void add(const Shortcuts::Loop& loop) {
+    shortcuts.commit(shortcuts.prepare(loop, false));
+    shortcuts.commit(shortcuts.prepare({}, true));
+  }
+
+  [[nodiscard]] double chi2(int frame, double height_m) {
+    return Reach(track, paths, camera_at(0, -height_m, 1), {}).chi2(frame);
+  }
+};
+
+TEST(ReachTest, ALoopIsAShortcut) {
+  LongWay way;
+  EXPECT_TRUE(is_in_reach(way.chi2(2, 3)));
+  way.add({.frame = LongWay::kBack, .match = 0});
+  EXPECT_FALSE(is_in_reach(way.chi2(2, 3)));
+  EXPECT_TRUE(is_in_reach(way.chi2(2, 0)));
+  way.shortcuts.remove(LongWay::kBack);
+  EXPECT_TRUE(is_in_reach(way.chi2(2, 3)));
+}
+
+TEST(ReachTest, ALoopIsNoShortcutBeforeAnotherAgrees) {
+  LongWay way;
+  way.shortcuts.commit(way.shortcuts.prepare({.frame = LongWay::kBack, .match = 0}, false));
+  EXPECT_TRUE(is_in_reach(way.chi2(2, 3)));
+  way.shortcuts.commit(way.shortcuts.prepare({}, false));
+  EXPECT_TRUE(is_in_reach(way.chi2(2, 3)));
+}
+
+TEST(ReachTest, AShortcutThatOdometryContradictsIsNotTaken) {
+  LongWay way;
+  way.add({.frame = LongWay::kBack, .match = 60});  // where the robot was 60 m from there
+  EXPECT_EQ(way.chi2(2, 0), LongWay().chi2(2, 0));
+}
+
+/// The variance of each frame's position upwards as seen from the last one: over all paths, slowly.
+std::vector<double> least_variances(const OdometryTrack& track, const Shortcuts& shortcuts,
+                                    double apart_sq) {
+  const int last = track.size() - 1;
+  std::vector<double> least(static_cast<std::size_t>(last + 1), 1e9);
+  least.back() = 0;
+  const auto shorten = [&](int from, int to, double step) {
+    const double by_it = least.at(static_cast<std::size_t>(from)) + step;
+    least.at(static_cast<std::size_t>(to)) =
+        std::min(least.at(static_cast<std::size_t>(to)), by_it);
+  };
+  for (int pass = 0; pass <= last; ++pass) {
+    for (int frame = 0; frame < last; ++frame) {
+      const double step = track.between(frame, frame + 1)->covariance(1, 1);
+      shorten(frame, frame + 1, step);
+      shorten(frame + 1, frame, step);
+    }
+    for (const auto& [from, to] : shortcuts.ends()) shorten(from, to, apart_sq);
+  }
+  return least;
+}
+
+TEST(ReachTest, ThePathIsTheSurestOfAll) {
+  cv::RNG random(35);
+  for (int trial = 0; trial < 20; ++trial) {
+    LongWay way;
+    for (int loop = 0; loop < 8; ++loop) {
+      const int frame = random.uniform(1, LongWay::kBack);
+      way.add({.frame = frame, .match = random.uniform(0, frame)});
+    }
+    const cv::Vec3d apart_sq(2, 0.1, 2);
+    const auto expected = least_variances(way.track, way.shortcuts, apart_sq[1]);
+    const auto now = way.track.next(camera_at(0, 0, 0));
+    SurestPaths paths(way.track, way.shortcuts, apart_sq);
+    for (int frame = 0; frame < LongWay::kBack; frame += random.uniform(1, 20)) {
+      const Motion direct = way.track.to_next(frame, now).value();
+      const Motion found = paths.from(frame, now, direct).value_or(direct);
+      const double still = way.track.to_next(LongWay::kBack, now)->covariance(1, 1);
+      EXPECT_NEAR(found.covariance(1, 1), expected[static_cast<std::size_t>(frame)] + still, 1e-5);
+    }
+  }
 }
 
 TEST(ReachTest, WeightsAreLikelihoods) {
@@ -83,6 +181,28 @@ int count(const std::vector<Detection>& detections, Status status) {
 OdometryPose around(int frame, double lift_m) {
   const double turned = 2 * CV_PI * frame / 40;
   return camera_at(6.4 * std::cos(turned), -lift_m * (frame / 40), 6.4 * std::sin(turned));
+}
+
+TEST(DetectorReach, LoopsMakeItNarrower) {
+  LoopDetectorOptions options = test::fast_options();
+  options.odometry = {
+      .position_per_m = 0.1, .rotation_deg_per_m = 1e-5, .rotation_per_rad = 0, .correlated_m = 2};
+  // After two laps around the circle, the first views of the first one from a storey above.
+  const auto loops_above = [&](int second_lap) {
+    LoopDetector detector(options);
+    std::vector<Detection> above;
+    for (int frame = 0; frame < 86; ++frame) {
+      const int view = frame / 40 == 1 ? second_lap + frame - 40 : frame % 40;
+      OdometryPose odometry = around(frame % 40, 0);
+      if (frame >= 80) odometry.T_odometry_camera(1, 3) = -3;
+      const Detection detection = detector.process(test::view(view), std::nullopt, odometry);
+      if (frame >= 80) above.push_back(detection);
+    }
+    return count(above, Status::loop);
+  };
+  const int other_views = 100;
+  EXPECT_GT(loops_above(other_views), 3) << "drift hides the storey";
+  EXPECT_EQ(loops_above(0), 0);
 }
 
 TEST(DetectorReach, APlaceOutOfReachIsNoLoop) {

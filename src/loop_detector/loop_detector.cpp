@@ -26,6 +26,7 @@
 #include "place_memory.hpp"
 #include "reach.hpp"
 #include "recent_view.hpp"
+#include "shortcuts.hpp"
 #include "workspace.hpp"
 
 namespace loopbit {
@@ -103,6 +104,7 @@ class LoopDetector::Impl {
   Impl(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
       : options_(options),
         odometry_(options.odometry),
+        paths_(odometry_, shortcuts_, Reach::views_sq(options.decision)),
         memory_(std::move(map)),
         filter_({[this](PlaceId place) { return origin(place); },
                  [this](const SessionFrame& at) { return find(at); },
@@ -256,9 +258,11 @@ class LoopDetector::Impl {
     recent_view_.reserve_next();
     attached_parts_.reserve_next(seen.features.working_size_px);
     KnownLoops found;
+    std::optional<Shortcuts::Next> shortcuts;
     if (detection.status == Status::loop) {
       const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
       found.add(seen.look.is_step ? latest + 1 : latest, seen.best->step);
+      shortcuts = shortcuts_with(detection, seen);
     }
     LateLoops::Next frame;
     if (!options_.decision.count_matches) {
@@ -275,11 +279,13 @@ class LoopDetector::Impl {
     attached_parts_.remember(working_size_px, seen.all_keypoints);
     latest_view_inliers_ = seen.view_inliers;
     known_loops_.take(found);
+    if (shortcuts) shortcuts_.commit(std::move(*shortcuts));
     place_filter_.commit(std::move(next));
     if (frame.empty()) return;
     late_loops_.commit(std::move(frame), seen.look.is_step, seen.changed);
     for (const LateLoops::Loop& loop : seen.changed.withdrawn) {
       known_loops_.remove(step_of(loop.frame), loop.matched_step);
+      shortcuts_.remove(loop.frame - memory_.session_begin());
     }
   }
 
@@ -333,6 +339,7 @@ class LoopDetector::Impl {
     if (!place || !wrong) return;
     known_loops_.remove(step_of(*place), step_of(*wrong));
     if (*place < memory_.session_begin()) return;
+    shortcuts_.remove(query.frame);
     place_filter_.withdraw(step_of(*wrong), known_loops_);
     late_loops_.reject(*place, step_of(*wrong), known_loops_);
     if (step_of(index_.size() - 1) == step_of(*place)) filter_.reject(*wrong);
@@ -540,13 +547,30 @@ class LoopDetector::Impl {
 
   /// `end`: of the candidates.
   void keep_in_reach(const OdometryPose& odometry, PlaceId end, Observation& seen) const {
-    seen.reach.emplace(odometry_, odometry, options_.decision);
+    seen.reach.emplace(odometry_, paths_, odometry, options_.decision);
     const PlaceTest wanted = std::exchange(seen.is_allowed, {});
     const auto test = [this, wanted, end, &reach = *seen.reach](PlaceId place, bool in_reach) {
       return (!wanted || wanted(place)) && (chi2(reach, place, end) <= Reach::kMaxChi2) == in_reach;
     };
     seen.is_allowed = [test](PlaceId place) { return test(place, true); };
     seen.is_too_far = [test](PlaceId place) { return test(place, false); };
+  }
+
+  /// A loop that odometry does not doubt is a shortcut as soon as another one agrees with it, far
+  /// enough away to be more than the same coincidence.
+  [[nodiscard]] std::optional<Shortcuts::Next> shortcuts_with(const Detection& loop,
+                                                              const Observation& seen) const {
+    const auto undoubted = [](double chi2) { return Reach::weight(chi2) == 1; };
+    if (!seen.reach || !loop.match || !odometry_.is_known(*loop.match)) return std::nullopt;
+    if (!undoubted(seen.reach->chi2(*loop.match))) return std::nullopt;
+    const auto& awaiting = shortcuts_.awaiting();
+    if (!awaiting) return shortcuts_.prepare({loop.frame, *loop.match}, false);
+    const double path_m = odometry_.next(loop.odometry).path_m;
+    if (path_m - odometry_.path_m(awaiting->frame) < options_.odometry.correlated_m) {
+      return std::nullopt;
+    }
+    const bool agrees = undoubted(seen.reach->chi2(*awaiting, *loop.match));
+    return shortcuts_.prepare({loop.frame, *loop.match}, agrees);
   }
 
   static bool is_candidate(PlaceId place, PlaceId end, const Observation& seen) {
@@ -699,8 +723,10 @@ class LoopDetector::Impl {
 
   LoopDetectorOptions options_;
   OdometryTrack odometry_;  ///< of this session
-  cv::Mat1b mask_;          ///< of all images; empty = none
-  BinaryContent excluded_;  ///< by the mask
+  Shortcuts shortcuts_;
+  mutable SurestPaths paths_;  ///< only process() asks for them, which is not const
+  cv::Mat1b mask_;             ///< of all images; empty = none
+  BinaryContent excluded_;     ///< by the mask
   PlaceIndex index_;
   PlaceMemory memory_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before

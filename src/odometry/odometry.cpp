@@ -42,6 +42,12 @@ bool is_covariance(const cv::Matx66d& covariance) {
 
 }  // namespace
 
+Motion chained(const Motion& first, const Motion& second) {
+  const cv::Matx66d adjoint = rigid::adjoint(rigid::inverse(second.T_from_to));
+  return {first.T_from_to * second.T_from_to,
+          adjoint * first.covariance * adjoint.t() + second.covariance};
+}
+
 cv::Matx66d drift_covariance(const cv::Matx44d& T_from_to, const OdometryDrift& drift) {
   constexpr double kLeastPosition_m = 1e-4;
   constexpr double kLeastRotation = 1e-3 * kRadians;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -53,6 +54,9 @@ struct Motion {
   cv::Matx66d covariance = cv::Matx66d::zeros();
 };
 
+/// One motion after another. Their errors are independent.
+Motion chained(const Motion& first, const Motion& second);
+
 /// The covariance of one odometry step. It is never singular: 0.1 mm and 0.001 degrees remain when
 /// the camera stands still.
 cv::Matx66d drift_covariance(const cv::Matx44d& T_from_to, const OdometryDrift& drift);
@@ -92,6 +96,11 @@ class OdometryTrack {
 
   /// The same to a frame that next() gave.
   [[nodiscard]] std::optional<Motion> to_next(int from, const Frame& next) const;
+
+  /// Whether odometry is known at `frame`.
+  [[nodiscard]] bool is_known(int frame) const {
+    return frames_.at(static_cast<std::size_t>(frame)).is_known;
+  }
 
   /// Distance driven until `frame`, in metres. At a frame without odometry, that of the last frame
   /// with it.
