@@ -99,6 +99,18 @@ class ReportTest : public test::ScratchTest {
   }
 };
 
+TEST_F(ReportTest, SaysHowTheTrajectoryWasCorrected) {
+  ReportRun run = finished_run("run");
+  const auto correction = [&] { return Json::parse(report_json({run}))["runs"][0]["correction"]; };
+  EXPECT_TRUE(correction().is_null());
+  run.run->trajectory = {{0, {0, 1, 0}, {0, 1, 0}}, {2, {1, 1, 9}, {2, 1, 8}}};
+  run.run->judged_loops = {{2, 0, LoopVerdict::kept}, {3, 1, LoopVerdict::outlier}};
+  EXPECT_EQ(correction(), Json::parse(R"({
+    "before": {"x_m": [0.0, null, 1.0, null], "y_m": [0.0, null, 9.0, null], "axes": ["x", "z"]},
+    "after": {"x_m": [0.0, null, 2.0, null], "y_m": [0.0, null, 8.0, null], "axes": ["x", "z"]},
+    "loops": [2, 0, 1, 3, 1, 0]})"));
+}
+
 TEST_F(ReportTest, SaysWhatTheRunFolderDoes) {
   const ReportRun run = finished_run("run");
   const Json json = Json::parse(report_json({run}))["runs"][0];

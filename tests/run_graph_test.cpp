@@ -10,6 +10,7 @@
 
 #include "loopbit/g2o_file.hpp"
 
+#include "run_folder.hpp"
 #include "test_support.hpp"
 
 namespace loopbit {
@@ -135,6 +136,28 @@ TEST_F(RunGraphTest, AllFramesWithOdometryGiveKittiRows) {
   ASSERT_EQ(rows.size(), std::size_t{kFrames});
   EXPECT_EQ(rows[0], "1 0 0 100 0 1 0 0 0 0 1 0");
   EXPECT_EQ(test::lines_of(path("corrected.tum"))[2].substr(0, 17), "0.100000 101.05 0");
+}
+
+TEST_F(RunGraphTest, IsReadWithItsRun) {
+  for (int frame = 15; frame < kFrames; ++frame) add_loop(frame, 20 - frame);
+  add_loop(13, 7, 20);
+  RunFolder folder(path("run"), false);
+  for (const Detection& detection : detections_) folder.add(detection);
+  EXPECT_TRUE(read_run(path("run")).trajectory.empty());
+  graph().write(path("run"));
+  const FinishedRun run = read_run(path("run"));
+  ASSERT_EQ(run.trajectory.size(), std::size_t{kFrames});
+  EXPECT_EQ(run.trajectory[20].frame, 20);
+  EXPECT_EQ(run.trajectory[20].odometry_m, cv::Vec3d(100, 0, 1));
+  EXPECT_LT(cv::norm(run.trajectory[20].corrected_m - cv::Vec3d(100, 0, 0)), 0.1);
+  ASSERT_EQ(run.judged_loops.size(), 7U);
+  EXPECT_EQ(run.judged_loops[0].query, 13);
+  EXPECT_EQ(run.judged_loops[0].match, 7);
+  EXPECT_NE(run.judged_loops[0].verdict, LoopVerdict::kept);
+  EXPECT_EQ(run.judged_loops[6].verdict, LoopVerdict::kept);
+  (void)write("run/judged_loops.csv", std::string(kJudgedLoopsHeader) + "\n3,1,fine,,0,0,0,0,0\n");
+  test::expect_error(ErrorKind::input, {"judged_loops.csv", "line 2", "'fine'"},
+                     [&] { (void)read_run(path("run")); });
 }
 
 TEST_F(RunGraphTest, WithoutOdometryThereIsNothingToCorrect) {

@@ -319,11 +319,10 @@ std::array<int, 2> plane(const std::vector<std::optional<cv::Vec3d>>& positions_
 
 std::string axis_name(int axis) { return std::string(1, static_cast<char>('x' + axis)); }
 
-Json positions(std::vector<std::optional<cv::Vec3d>> positions_m, int frames) {
-  positions_m.resize(static_cast<std::size_t>(frames));
-  const auto has_position = [](const auto& position) { return position.has_value(); };
-  if (std::none_of(positions_m.begin(), positions_m.end(), has_position)) return nullptr;
-  const auto [across, along] = plane(positions_m);
+/// In the plane of two axes.
+Json positions(const std::vector<std::optional<cv::Vec3d>>& positions_m,
+               const std::array<int, 2>& axes) {
+  const auto [across, along] = axes;
   Json x = Json::array();
   Json y = Json::array();
   for (const auto& position : positions_m) {
@@ -331,6 +330,37 @@ Json positions(std::vector<std::optional<cv::Vec3d>> positions_m, int frames) {
     y.push_back(position ? Json((*position)[along]) : Json());
   }
   return {{"x_m", x}, {"y_m", y}, {"axes", {axis_name(across), axis_name(along)}}};
+}
+
+/// Null if none is known.
+Json positions(std::vector<std::optional<cv::Vec3d>> positions_m, int frames) {
+  positions_m.resize(static_cast<std::size_t>(frames));
+  const auto has_position = [](const auto& position) { return position.has_value(); };
+  if (std::none_of(positions_m.begin(), positions_m.end(), has_position)) return nullptr;
+  return positions(positions_m, plane(positions_m));
+}
+
+/// Positions by odometry and corrected in the plane of the latter, by frame, and the judged loops
+/// as flat triples query, match, and 1 if it is kept. Null if nothing was corrected.
+Json correction_json(const FinishedRun& run, int frames) {
+  if (run.trajectory.empty()) return nullptr;
+  const auto count = static_cast<std::size_t>(frames);
+  std::vector<std::optional<cv::Vec3d>> before(count);
+  std::vector<std::optional<cv::Vec3d>> after(count);
+  for (const CorrectedPosition& position : run.trajectory) {
+    const auto frame = static_cast<std::size_t>(position.frame);
+    if (frame >= count) continue;
+    before[frame] = position.odometry_m;
+    after[frame] = position.corrected_m;
+  }
+  Json loops = Json::array();
+  for (const LoopJudgement& loop : run.judged_loops) {
+    for (const int number : {loop.query, loop.match, loop.verdict == LoopVerdict::kept ? 1 : 0}) {
+      loops.push_back(number);
+    }
+  }
+  const auto axes = plane(after);
+  return {{"before", positions(before, axes)}, {"after", positions(after, axes)}, {"loops", loops}};
 }
 
 /// Always includes the match of every frame, even if other pairs are left out.
@@ -393,6 +423,7 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
   json["similarity_matrix"] = nullptr;
   json["pictures"] = Json::object();
   json["poses"] = nullptr;
+  json["correction"] = nullptr;
   if (!run.run) return json;
 
   LoopDetectorOptions options;
@@ -408,6 +439,7 @@ Json run_json(const ReportRun& run, const std::vector<ReportRun>& runs,
     json["pictures"] = report::pictures(views, evidence, max_picture_bytes);
   }
   json["poses"] = report::loop_poses(*run.run, json["pictures"]);
+  json["correction"] = correction_json(*run.run, frames);
   return json;
 }
 

@@ -19,6 +19,7 @@
 
 #include "run_files.hpp"
 #include "run_folder.hpp"
+#include "run_graph.hpp"
 
 namespace loopbit {
 namespace {
@@ -229,6 +230,34 @@ LoopPose loop_pose_from(const Row& row) {
   return loop;
 }
 
+CorrectedPosition corrected_from(const Row& row) {
+  constexpr std::size_t kColumns = 8;
+  row.check_columns(kColumns);
+  return {row.number<PlaceId>(0),
+          {row.number<double>(2), row.number<double>(3), row.number<double>(4)},
+          {row.number<double>(5), row.number<double>(6), row.number<double>(7)}};
+}
+
+LoopJudgement judgement_from(const Row& row) {
+  constexpr std::size_t kColumns = 9;
+  row.check_columns(kColumns);
+  return {row.number<PlaceId>(0), row.number<PlaceId>(1), named(row, 2, kAllLoopVerdicts)};
+}
+
+/// What --correct wrote, if it did.
+void read_correction(const fs::path& folder, FinishedRun& run) {
+  const fs::path trajectory = folder / kTrajectoryFile;
+  if (is_there(trajectory)) {
+    for_each_row(trajectory.string(), kTrajectoryHeader,
+                 [&](const Row& row) { run.trajectory.push_back(corrected_from(row)); });
+  }
+  const fs::path loops = folder / kJudgedLoopsFile;
+  if (is_there(loops)) {
+    for_each_row(loops.string(), kJudgedLoopsHeader,
+                 [&](const Row& row) { run.judged_loops.push_back(judgement_from(row)); });
+  }
+}
+
 }  // namespace
 
 std::vector<Detection> read_detections(const std::string& path) {
@@ -274,6 +303,7 @@ FinishedRun read_run(const std::string& path) {
     for_each_row((folder / kPosesFile).string(), poses_header(),
                  [&](const Row& row) { run.poses.push_back(loop_pose_from(row)); });
   }
+  read_correction(folder, run);
   if (is_there(folder / kCameraFile)) run.camera = read_camera((folder / kCameraFile).string());
   if (is_there(folder / kEvidenceFile)) run.evidence_path = (folder / kEvidenceFile).string();
   return run;

@@ -59,6 +59,33 @@ export async function checkWeakest(page) {
   await page.locator("[data-filter=all]").press("Enter");
 }
 
+/** The trajectory before and after is there if it was corrected, with the number of loops. */
+export async function checkCorrection(page) {
+  const run = (await embedded(page)).runs[0];
+  const view = page.locator("#correction");
+  if (!run.correction) {
+    assert.ok((await view.count()) === 0 || (await view.isHidden()), "nothing was corrected");
+    return;
+  }
+  const kept = run.correction.loops.filter((_, i) => i % 3 === 2);
+  const shown = (await view.locator(".legend li").allTextContents()).map((text) =>
+    text.replaceAll(",", ""),
+  );
+  const counted = (number) => `${number || "no"} loop${number > 1 ? "s" : ""}`;
+  const rejected = kept.filter((isKept) => !isKept).length;
+  assert.deepEqual(shown, [
+    "corrected",
+    "odometry",
+    `${counted(kept.length - rejected)} kept`,
+    `${counted(rejected)} rejected`,
+  ]);
+  const errors = run.record.correction ?? {};
+  const caption = await view.locator(".caption").textContent();
+  for (const error of [errors.odometry_error_m, errors.corrected_error_m]) {
+    if (typeof error === "number") assert.ok(caption.includes(`${error.toFixed(2)} m`), caption);
+  }
+}
+
 /** Revisits are listed, and one of them leads to its first pair. */
 export async function checkRevisits(page) {
   const run = (await embedded(page)).runs[0];

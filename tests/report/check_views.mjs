@@ -269,7 +269,7 @@ export async function checkViews(page, isBrief) {
   const frames = spread(loops.length > 0 ? loops : run.status.map((_, i) => i), isBrief ? 3 : 5);
   const ofLoops = loops.length > 0 ? ["#matrix", "#precision-recall"] : [];
   const views = [];
-  for (const view of ["#trajectory", "#score", ...ofLoops])
+  for (const view of ["#trajectory", "#correction", "#score", ...ofLoops])
     if (await page.isVisible(`${view} .plot`)) views.push(view);
   await checkMarks(page, views, frames);
   await checkNoMarkElsewhere(page, run);

@@ -27,6 +27,7 @@ import {
 import { checkPaper, checkThemes, checkWidths } from "./check_looks.mjs";
 import { checkNumbers, checkPairs } from "./check_numbers.mjs";
 import {
+  checkCorrection,
   checkEnlarge,
   checkFigures,
   checkPlay,
@@ -144,6 +145,7 @@ async function checkReport(
   await run("true place", checkTruePlace);
   await run("search", checkSearch);
   await run("revisits", checkRevisits);
+  await run("correction", checkCorrection);
   await run("weakest first", checkWeakest);
   if (!isBrief) {
     await run("play", checkPlay);

@@ -23,6 +23,8 @@ world=(--frames 150 --world laps=2 "${town[@]}")
   seq -f "$scratch/wide/images/%06g.png" 75 149
 } >"$scratch/mixed.txt"
 "$loopbit" run "$scratch/mixed.txt" --out "$scratch/mixed"
+"$loopbit" run "$scratch/town" --odometry "$scratch/town/odometry.txt" --correct --no-poses --out "$scratch/corrected" \
+  --poses "$scratch/town/poses.txt"
 printf 'query,match,score\n120,45,0.9\n121,10,0.7\n' >"$scratch/other.csv"
 "$loopbit" compare "$scratch/demo" "$scratch/strict" "other=$scratch/other.csv" \
   --out "$scratch/compared.html"
@@ -36,6 +38,7 @@ node "$here/report_test.mjs" --playwright "$root/build/page/node_modules" --page
   --report "$scratch/demo/report.html" --run-json "$scratch/demo/run.json" \
   --report "$scratch/second/report.html" --run-json "$scratch/second/run.json" \
   --report "$scratch/mixed/report.html" --run-json "$scratch/mixed/run.json" \
+  --report "$scratch/corrected/report.html" --run-json "$scratch/corrected/run.json" \
   --exports "$scratch" --report "$scratch/compared.html" --opens "$scratch/no_frames.html"
 
 # What a person judged is truth for the command.

@@ -10,6 +10,7 @@ import "./pictures.css";
 import "./footer.css";
 import "./live.css";
 import "./print.css";
+import { Correction } from "./correction.ts";
 import { button, html } from "./dom.ts";
 import { Footer } from "./footer.ts";
 import { keyHelp, listenToKeys } from "./keyboard.ts";
@@ -37,6 +38,7 @@ function readData(): ReportData {
 /** The plots, in the order in which one asks: where, how sure, how alike, how good, how fast. */
 function plotsOf(store: Store, models: readonly RunModel[]): View[] {
   const views: View[] = [new Trajectory(store), new Score(store), new Matrix(store)];
+  if (models.some((model) => model.run.correction)) views.splice(1, 0, new Correction(store));
   if (models.some((model) => model.run.evaluation)) views.push(new PrecisionRecall(store, models));
   if (models.some((model) => model.run.times_ms)) views.push(new Times(store, models));
   return views;

@@ -41,6 +41,10 @@ function termsOf({ run }: RunModel, frame: number): HTMLElement | null {
 function changesOf(model: RunModel, frame: number): HTMLElement[] {
   return model.changes(frame).map((change) => {
     const score = format.score(change.score, model.run.threshold);
+    if (change.isWithdrawn && model.isRejected(frame, change.match)) {
+      const graph = `The pose graph rejected its loop with ${change.matchName}.`;
+      return html("p", { class: "terms", "data-key": "pair.change" }, graph);
+    }
     const text = change.isWithdrawn
       ? `Frame ${change.by} withdrew its loop with ${change.matchName}: only ${score} by then.`
       : `A late loop with ${change.matchName}: ${score} from frame ${change.by} on.`;

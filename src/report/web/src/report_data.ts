@@ -73,11 +73,9 @@ export interface Run {
   truth: { same_place: number[]; near_place: number[]; source: string | null } | null;
   evaluation: Evaluation | null;
   /** Camera centres in the plane of their largest extent, m; null if unknown. */
-  positions: {
-    x_m: (number | null)[];
-    y_m: (number | null)[];
-    axes: [x: string, y: string];
-  } | null;
+  positions: Positions | null;
+  /** Null if the trajectory was not corrected. */
+  correction: TrajectoryCorrection | null;
   similarity_matrix: SimilarityMatrix | null;
   /** Relative poses of loops by query; null if none were measured. */
   poses: Record<string, LoopPose> | null;
@@ -94,6 +92,21 @@ export type LateLoop = [
   score: number,
   isWithdrawn: boolean,
 ];
+
+/** In a plane, m; null for frames whose position is unknown. */
+export interface Positions {
+  x_m: (number | null)[];
+  y_m: (number | null)[];
+  axes: [x: string, y: string];
+}
+
+/** What the pose graph made of the trajectory, before = by odometry. Loops are flat triples query,
+ * match, and 1 if it is kept. */
+export interface TrajectoryCorrection {
+  before: Positions;
+  after: Positions;
+  loops: number[];
+}
 
 /** In nats; null for frames without a match. */
 export interface ScoreTerms {
@@ -167,6 +180,8 @@ export interface RunRecord {
   wall_s?: number;
   frames_per_s?: number;
   peak_memory_mib?: number;
+  /** With --correct. Errors only if true positions are known. */
+  correction?: { odometry_error_m: number | null; corrected_error_m: number | null };
 }
 
 /** A point of the precision-recall curve: all queries with at least this score. */

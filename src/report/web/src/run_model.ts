@@ -206,6 +206,14 @@ export class RunModel {
     });
   }
 
+  /** Whether the pose graph rejected a loop. */
+  isRejected(query: number, match: number | null): boolean {
+    const loops = this.run.correction?.loops ?? [];
+    return loops.some(
+      (frame, i) => i % 3 === 0 && frame === query && loops[i + 1] === match && loops[i + 2] === 0,
+    );
+  }
+
   /** How many loops were found late, or withdrawn. */
   countChanges(isWithdrawn: boolean): number {
     const all = [...this.changed.values()].flat();

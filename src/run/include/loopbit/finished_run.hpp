@@ -26,6 +26,20 @@ struct LoopPose {
   int inliers = 0;
 };
 
+/// A row of trajectory.csv.
+struct CorrectedPosition {
+  PlaceId frame = 0;
+  cv::Vec3d odometry_m;
+  cv::Vec3d corrected_m;
+};
+
+/// The verdict of the pose graph on a loop, as judged_loops.csv has it.
+struct LoopJudgement {
+  PlaceId query = 0;
+  PlaceId match = 0;
+  LoopVerdict verdict = LoopVerdict::undecided;
+};
+
 /// The folder of a run; see docs/run_folder.md.
 struct FinishedRun {
   std::string path;
@@ -35,9 +49,11 @@ struct FinishedRun {
   std::optional<GroundTruth> truth;  ///< the truth that the run was given
   /// Camera centres, one per frame; empty if the run had no poses.
   std::vector<std::optional<cv::Vec3d>> positions_m;
-  std::string evidence_path;          ///< empty if there is none
-  std::vector<LoopPose> poses;        ///< empty if none were measured
-  std::optional<CameraModel> camera;  ///< of the images, if it is known
+  std::string evidence_path;                  ///< empty if there is none
+  std::vector<LoopPose> poses;                ///< empty if none were measured
+  std::optional<CameraModel> camera;          ///< of the images, if it is known
+  std::vector<CorrectedPosition> trajectory;  ///< empty if it was not corrected
+  std::vector<LoopJudgement> judged_loops;
 
   /// The frames of the run, with their times.
   [[nodiscard]] FramesRead frames() const;
