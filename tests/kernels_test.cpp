@@ -278,7 +278,8 @@ float random_coordinate(Random& random) { return static_cast<float>(4 * random.u
 
 PairSamples random_samples(Random& random) {
   PairSamples samples;
-  for (auto* points : {&samples.x0, &samples.y0, &samples.x1, &samples.y1}) {
+  for (auto* points :
+       {&samples.x0, &samples.y0, &samples.z0, &samples.x1, &samples.y1, &samples.z1}) {
     for (auto& pair : *points) {
       std::generate(std::begin(pair), std::end(pair), [&] { return random_coordinate(random); });
     }
@@ -296,16 +297,19 @@ cv::Matx33d matrix_at(const EpipolarPencils& pencils, std::size_t lane, double x
 
 /// Random pairs, of which whatever lies behind the last one is not to be looked at.
 struct RandomPairs {
-  RandomPairs(Random& random, std::size_t count) : coordinates(4 * (count + kPairBlock)) {
+  RandomPairs(Random& random, std::size_t count) : coordinates(8 * (count + kPairBlock)) {
     std::generate(coordinates.begin(), coordinates.end(),
                   [&] { return random_coordinate(random); });
-    const float* first = coordinates.data();
     const std::size_t stride = count + kPairBlock;
-    pairs = {first, first + stride, first + 2 * stride, first + 3 * stride, count};
+    const auto array = [&](std::size_t i) { return coordinates.data() + i * stride; };
+    for (std::size_t i = 0; i < 2 * stride; ++i) array(6)[i] = std::abs(array(6)[i]);
+    pairs = {array(0), array(1), array(2), array(3), array(4), array(5), count};
+    spreads = {array(6), array(7), 0.7F};
   }
 
   std::vector<float> coordinates;
   PointPairs pairs;
+  RaySpreads spreads;
 };
 
 /// From the definition.
@@ -318,6 +322,21 @@ double sampson_sq(const std::array<float, 9>& model, const PointPairs& pairs, st
   const cv::Vec3d fq = f.t() * q;
   const double error = q.dot(fp);
   return error * error / (fp[0] * fp[0] + fp[1] * fp[1] + fq[0] * fq[0] + fq[1] * fq[1]);
+}
+
+/// The same for rays: an error is an angle, in pixels at both of them.
+double sampson_sq(const std::array<float, 9>& model, const PointPairs& pairs,
+                  const RaySpreads& spreads, std::size_t i) {
+  cv::Matx33d e;
+  std::copy(model.begin(), model.end(), std::begin(e.val));
+  const cv::Vec3d p(pairs.x0[i], pairs.y0[i], pairs.z0[i]);
+  const cv::Vec3d q(pairs.x1[i], pairs.y1[i], pairs.z1[i]);
+  const auto size_sq = [&](const cv::Vec3d& normal) {
+    return spreads.xy_scale_sq * (normal[0] * normal[0] + normal[1] * normal[1]) +
+           normal[2] * normal[2];
+  };
+  const double error = q.dot(e * p);
+  return error * error / (spreads.sq1[i] * size_sq(e * p) + spreads.sq0[i] * size_sq(e.t() * q));
 }
 
 class EveryKernel : public testing::TestWithParam<InstructionSet> {};
@@ -618,8 +637,8 @@ TEST_P(EveryKernel, SolvesSamplesOfSevenPairs) {
         const cv::Matx33d matrix = matrix_at(pencils, lane, x);
         const double size = cv::norm(matrix);
         for (std::size_t k = 0; k < kSamplePairs; ++k) {
-          const cv::Vec3d p(samples.x0[k][lane], samples.y0[k][lane], 1);
-          const cv::Vec3d q(samples.x1[k][lane], samples.y1[k][lane], 1);
+          const cv::Vec3d p(samples.x0[k][lane], samples.y0[k][lane], samples.z0[k][lane]);
+          const cv::Vec3d q(samples.x1[k][lane], samples.y1[k][lane], samples.z1[k][lane]);
           ASSERT_NEAR(q.dot(matrix * p) / size, 0, 1e-6) << "pair " << k << " at " << x;
         }
         const auto& power = pencils.determinant;
@@ -655,7 +674,8 @@ TEST_P(EveryKernel, PencilsEqualTheScalarOnes) {
 TEST_P(EveryKernel, TellsWhichSamplesDetermineNothing) {
   Random random;
   PairSamples samples = random_samples(random);
-  for (auto* points : {&samples.x0, &samples.y0, &samples.x1, &samples.y1}) {
+  for (auto* points :
+       {&samples.x0, &samples.y0, &samples.z0, &samples.x1, &samples.y1, &samples.z1}) {
     for (auto& pair : *points) {
       pair[2] = 0.5F;                                 // one pair, seven times
       pair[5] = points == &samples.x0 ? 0 : pair[5];  // all on one line through the origin
@@ -699,6 +719,36 @@ TEST_P(EveryKernel, ScoresPairsBySampsonsDistance) {
   }
 }
 
+TEST_P(EveryKernel, ScoresRaysByAngles) {
+  constexpr float kMaxErrorSq = 0.3F;
+  Random random;
+  for (const std::size_t count : {0U, 1U, 15U, 16U, 17U, 100U}) {
+    const RandomPairs rays(random, count);
+    std::array<float, 9> model{};
+    std::generate(model.begin(), model.end(), [&] { return random_coordinate(random); });
+    std::vector<std::uint8_t> is_inlier(count + kPairBlock, 9);
+    const EpipolarScore score =
+        kernels_for<EpipolarKernels>(GetParam())
+            .ray_score(model.data(), rays.pairs, rays.spreads, kMaxErrorSq, is_inlier.data());
+    double cost = 0;
+    int inliers = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double distance_sq = sampson_sq(model, rays.pairs, rays.spreads, i);
+      cost += std::min<double>(distance_sq, kMaxErrorSq);
+      inliers += distance_sq < kMaxErrorSq ? 1 : 0;
+      EXPECT_EQ(is_inlier[i], distance_sq < kMaxErrorSq ? 1 : 0) << i << " of " << count;
+    }
+    EXPECT_EQ(score.inliers, inliers) << count;
+    EXPECT_NEAR(score.cost, cost, 1e-4) << count;
+
+    std::vector<std::uint8_t> expected_inliers(is_inlier.size(), 9);
+    const EpipolarScore expected = kernels_for<EpipolarKernels>(kScalar).ray_score(
+        model.data(), rays.pairs, rays.spreads, kMaxErrorSq, expected_inliers.data());
+    EXPECT_EQ(score.cost, expected.cost);
+    EXPECT_EQ(is_inlier, expected_inliers);
+  }
+}
+
 TEST_P(EveryKernel, WithoutGradientThereIsNoInlier) {
   Random random;
   const RandomPairs random_pairs(random, 3);
@@ -709,6 +759,11 @@ TEST_P(EveryKernel, WithoutGradientThereIsNoInlier) {
           .epipolar_score(nothing.data(), random_pairs.pairs, 0.5F, is_inlier.data());
   EXPECT_EQ(score.inliers, 0);
   EXPECT_EQ(score.cost, 1.5F);
+  const EpipolarScore of_rays = kernels_for<EpipolarKernels>(GetParam())
+                                    .ray_score(nothing.data(), random_pairs.pairs,
+                                               random_pairs.spreads, 0.5F, is_inlier.data());
+  EXPECT_EQ(of_rays.inliers, 0);
+  EXPECT_EQ(of_rays.cost, 1.5F);
 }
 
 INSTANTIATE_TEST_SUITE_P(Kernels, EveryKernel, testing::ValuesIn(available_instruction_sets()),

@@ -19,6 +19,7 @@
 
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
+#include "loopbit/world.hpp"
 
 #include "map_support.hpp"
 #include "test_support.hpp"
@@ -355,6 +356,79 @@ TEST(LoopDetector, AMaskThatDoesNotFitIsRefused) {
   EXPECT_EQ(detector.size(), 0);
   detector.set_mask(cv::Mat1b(240, 320, 255));
   EXPECT_EQ(detector.process(view(0)).frame, 0);
+}
+
+// Cameras
+
+TEST(LoopDetector, ACameraThatDoesNotFitIsRefused) {
+  LoopDetector detector(fast_options());
+  CameraModel camera{.fx = 300, .fy = 300, .cx = 160, .cy = 120};
+  expect_error(ErrorKind::input, {"set_camera()", "size_px"}, [&] { detector.set_camera(camera); });
+  camera.size_px = {640, 480};
+  camera.fy = -1;
+  expect_error(ErrorKind::input, {"set_camera()", "-1"}, [&] { detector.set_camera(camera); });
+  camera.fy = 300;
+  detector.set_camera(camera);
+  expect_error(ErrorKind::input, {"set_camera()", "640 x 480", "320 x 240"},
+               [&] { detector.process(view(0)); });
+  EXPECT_EQ(detector.size(), 0);
+  camera.size_px = {320, 240};
+  detector.set_camera(camera);
+  EXPECT_EQ(detector.process(view(0)).frame, 0);
+}
+
+TEST(LoopDetector, ACameraThatIsTakenBackChangesNothing) {
+  const std::vector<cv::Mat1b> images = two_laps();
+  LoopDetector plain(fast_options());
+  LoopDetector taken_back(fast_options());
+  taken_back.set_camera(
+      CameraModel{.size_px = {640, 480}, .fx = 600, .fy = 600, .cx = 320, .cy = 240});
+  taken_back.set_camera(std::nullopt);
+  const auto expected = process_all(plain, images);
+  const auto found = process_all(taken_back, images);
+  for (std::size_t i = 0; i < images.size(); ++i) expect_same_answer(found[i], expected[i]);
+}
+
+/// Loops of a drive through a town, and wrong ones.
+std::pair<int, int> loops_of(const World& world, const std::vector<cv::Mat>& images,
+                             const std::optional<CameraModel>& camera) {
+  const std::vector<PlaceRun> right = world.near_place();
+  LoopDetector detector;
+  detector.set_camera(camera);
+  int loops = 0;
+  int wrong = 0;
+  for (const cv::Mat& image : images) {
+    const Detection detection = detector.process(image);
+    if (detection.status != Status::loop) continue;
+    ++loops;
+    const bool is_right = std::ranges::any_of(right, [&](const PlaceRun& run) {
+      return run.query == detection.frame && run.first <= *detection.match &&
+             *detection.match <= run.last;
+    });
+    wrong += is_right ? 0 : 1;
+  }
+  return {loops, wrong};
+}
+
+TEST(LoopDetector, ACameraFindsMoreThroughAFisheye) {
+  WorldOptions options;
+  options.frames = 130;
+  options.laps = 2;
+  options.spacing_m = 1.8;
+  options.lateral_offset_m = 3;
+  options.light_change = 1;
+  options.width_px = 320;
+  options.height_px = 240;
+  options.fisheye_deg = 150;
+  const World world(options);
+  std::vector<cv::Mat> images;
+  for (int frame = 0; frame < options.frames; ++frame) images.push_back(world.render(frame));
+  const auto [without, wrong_without] = loops_of(world, images, std::nullopt);
+  const auto [with, wrong_with] = loops_of(world, images, world.camera(0));
+  EXPECT_GT(without, 0);
+  EXPECT_GT(with, without);
+  EXPECT_EQ(wrong_with, 0);
+  EXPECT_EQ(wrong_without, 0);
 }
 
 // Places that look alike

@@ -14,6 +14,7 @@
 #include <gtest/gtest.h>
 #include <opencv2/calib3d.hpp>
 
+#include "test_cameras.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
@@ -302,6 +303,91 @@ TEST(EpipolarInliers, AreTheSameEveryTime) {
   EXPECT_EQ(inliers_of(views), first);
   static_cast<void>(inliers_of(two_views(random, 20, 20)));
   EXPECT_EQ(inliers_of(views), first);
+}
+
+/// Points all around a camera that moves 0.9 m and turns by 17 degrees, to 0.3 px; those in view of
+/// both images. Then `num_random` pairs of unrelated pixels.
+TwoViews views_through(const CameraModel& camera, Random& random, int num_right, int num_random) {
+  TwoViews views;
+  views.query.working_size_px = views.place.working_size_px = camera.size_px;
+  const cv::Rect2d image({}, cv::Size2d(camera.size_px));
+  cv::Matx33d turn;
+  cv::Rodrigues(cv::Vec3d(0.05, 0.28, -0.03), turn);
+  const auto noisy = [&](const cv::Vec2d& pixel) {
+    return cv::Point2d(pixel[0] + 0.3 * random.normal(), pixel[1] + 0.3 * random.normal());
+  };
+  while (static_cast<int>(views.matches.size()) < num_right) {
+    const cv::Vec3d point_m(10 * random.uniform() - 5, 10 * random.uniform() - 5,
+                            10 * random.uniform());
+    const auto a = project(camera, point_m);
+    const auto b = project(camera, turn * (point_m - cv::Vec3d(0.8, -0.1, 0.4)));
+    if (!a || !b || !image.contains(cv::Point2d(*a)) || !image.contains(cv::Point2d(*b))) continue;
+    views.add(noisy(*a), noisy(*b));
+  }
+  views.num_right = views.matches.size();
+  for (int i = 0; i < num_random; ++i) {
+    const cv::Point2d in_place(random.uniform() * image.width, random.uniform() * image.height);
+    views.add({random.uniform() * image.width, random.uniform() * image.height}, in_place);
+  }
+  return views;
+}
+
+TEST(EpipolarInliers, OfRaysFindNearlyAllRightMatchesThroughAnyLens) {
+  for (const CameraModel& camera : {test::pinhole(), test::euroc(), test::fisheye()}) {
+    for (int run = 0; run < 10; ++run) {
+      Random random(run);
+      const TwoViews views = views_through(camera, random, 60, 40);
+      const Matches inliers =
+          epipolar_inliers(views.query, views.place, views.matches, kErrorPx, &camera);
+      const int right = count_right(views, inliers);
+      EXPECT_GE(right, 57) << to_string(camera.lens) << ' ' << run;
+      EXPECT_LE(static_cast<int>(inliers.size()) - right, 5)
+          << to_string(camera.lens) << ' ' << run;
+      EXPECT_EQ(epipolar_inliers(views.query, views.place, views.matches, kErrorPx, &camera),
+                inliers);
+    }
+  }
+}
+
+TEST(EpipolarInliers, OfPixelsMissMatchesThroughAFisheye) {
+  Random random;
+  const TwoViews views = views_through(test::fisheye(), random, 60, 40);
+  EXPECT_LT(count_right(views, inliers_of(views)), 52);
+}
+
+TEST(EpipolarInliers, OfRaysAreThoseOfTheResizedImage) {
+  Random random;
+  CameraModel large = test::fisheye();
+  const TwoViews views = views_through(large, random, 60, 40);
+  large = resized(large, {1280, 960});
+  const CameraModel own = test::fisheye();
+  EXPECT_EQ(epipolar_inliers(views.query, views.place, views.matches, kErrorPx, &large),
+            epipolar_inliers(views.query, views.place, views.matches, kErrorPx, &own));
+}
+
+TEST(EpipolarInliers, NeedImagesOfOneSizeForRays) {
+  Random random;
+  TwoViews views = views_through(test::fisheye(), random, 60, 40);
+  const CameraModel camera = test::fisheye();
+  EXPECT_EQ(chance_inliers(views.query, views.place, &camera), 6);
+  EXPECT_EQ(chance_inliers(views.query, views.place, nullptr), 8);
+  views.place.working_size_px = {700, 438};
+  EXPECT_EQ(chance_inliers(views.query, views.place, &camera), 8);
+  EXPECT_EQ(epipolar_inliers(views.query, views.place, views.matches, kErrorPx, &camera),
+            inliers_of(views));
+}
+
+TEST(EpipolarInliers, OfRaysNeverLieWhereTheLensSeesNothing) {
+  CameraModel camera = test::fisheye();
+  camera.distortion = {-0.2};  // turns back 1.3 rad from the axis
+  Random random;
+  TwoViews views = views_through(test::fisheye(), random, 40, 0);
+  views.add({1, 1}, {2, 2});
+  ASSERT_FALSE(unproject(camera, {1, 1}));
+  for (const Match& inlier :
+       epipolar_inliers(views.query, views.place, views.matches, kErrorPx, &camera)) {
+    EXPECT_LT(inlier.query, 40);
+  }
 }
 
 TEST(EpipolarInliers, NeedEightMatches) {

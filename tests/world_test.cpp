@@ -241,6 +241,54 @@ TEST(WorldRender, HasTheSizeAskedFor) {
   EXPECT_EQ(image.type(), CV_8UC3);
 }
 
+TEST(WorldRender, AFisheyeSeesWhatAPinholeSees) {
+  WorldOptions options = small_world();
+  options.noise = 0;
+  const World pinhole(options);
+  options.fisheye_deg = 150;
+  const World fisheye(options);
+  const CameraModel flat = pinhole.camera(25);
+  const CameraModel bent = fisheye.camera(25);
+  EXPECT_EQ(bent.lens, Lens::equidistant);
+  const cv::Mat3b seen = pinhole.render(25);
+  const cv::Mat3b image = fisheye.render(25);
+  double difference = 0;
+  int compared = 0;
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      const auto ray = unproject(bent, {static_cast<double>(x), static_cast<double>(y)});
+      const auto at = ray ? project(flat, *ray) : std::nullopt;
+      if (!at) continue;
+      const cv::Point pixel(cvRound((*at)[0]), cvRound((*at)[1]));
+      if (!cv::Rect({}, seen.size()).contains(pixel)) continue;
+      ++compared;
+      difference += cv::norm(cv::Vec3d(seen(pixel)) - cv::Vec3d(image(y, x)), cv::NORM_L1) / 3;
+    }
+  }
+  EXPECT_GT(compared, 4000);
+  EXPECT_LT(difference / compared, 12);
+}
+
+TEST(WorldRender, AFisheyeIsBlackBeyond80Degrees) {
+  WorldOptions options = small_world();
+  options.noise = 0;
+  options.fisheye_deg = 170;
+  const World world(options);
+  const cv::Mat3b image = world.render(25);
+  for (int y = 0; y < image.rows; y += 7) {
+    for (int x = 0; x < image.cols; ++x) {
+      const auto ray =
+          unproject(world.camera(25), {static_cast<double>(x), static_cast<double>(y)});
+      ASSERT_TRUE(ray);
+      constexpr double kCos80 = 0.1736;
+      constexpr double kMargin = 0.01;
+      if ((*ray)[2] > kCos80 - kMargin) continue;
+      EXPECT_EQ(image(y, x), cv::Vec3b()) << x << ' ' << y;
+    }
+  }
+  EXPECT_NE(image(60, 80), cv::Vec3b());
+}
+
 TEST(WorldRender, DependsNeitherOnOrderNorOnThreads) {
   const World world(small_world());
   const std::vector<int> frames{0, 33, 80, 121, 179};

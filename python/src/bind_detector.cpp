@@ -306,6 +306,11 @@ void SharedDetector::set_mask(const std::optional<ImageArgument>& mask) {
   detector_.set_mask(pixels);
 }
 
+void SharedDetector::set_camera(const std::optional<CameraModel>& camera) {
+  const Answering guard(mutex_, is_answering_);
+  detector_.set_camera(camera);
+}
+
 Detection SharedDetector::skip(std::optional<double> timestamp_s,
                                const std::optional<MatrixArgument>& odometry,
                                const std::optional<MatrixArgument>& odometry_covariance) {
@@ -390,6 +395,10 @@ void bind_detector(py::module_& module) {
            "Excludes part of all images from now on, such as the robot's own body: where mask, "
            "uint8 of shape (h, w), is 0, there is no content and no feature has its centre. Images "
            "must have its size. None excludes nothing.")
+      .def("set_camera", &SharedDetector::set_camera, py::arg("camera"),
+           "The calibration of all images from now on, see read_cameras(): matches have to agree "
+           "with a motion of this camera, also through a fisheye. Images must have its size, which "
+           "it has to know. None = not known, as in the beginning.")
       .def("skip", &SharedDetector::skip, py::arg("timestamp_s") = py::none(),
            py::arg("odometry") = py::none(), py::arg("odometry_covariance") = py::none(),
            "Counts a frame without a usable image, so that frame numbers stay aligned. For "

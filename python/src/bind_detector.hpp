@@ -33,6 +33,7 @@ class SharedDetector {
                                 std::vector<RankedPlace>* ranking, Evidence* evidence,
                                 const AllowedArgument& allowed) const;
   void set_mask(const std::optional<ImageArgument>& mask);
+  void set_camera(const std::optional<CameraModel>& camera);
   Detection skip(std::optional<double> timestamp_s, const std::optional<MatrixArgument>& odometry,
                  const std::optional<MatrixArgument>& odometry_covariance);
   void remove(const PlaceArgument& place);

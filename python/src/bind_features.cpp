@@ -96,10 +96,15 @@ void bind_verification(py::module_& module) {
       py::arg("query"), py::arg("place"), py::arg("max_ratio"),
       "Mutual best matches that pass the ratio test from both sides, as a structured array of "
       "query and place.");
-  module.def("verify", &verify, py::arg("query"), py::arg("place"),
-             py::arg_v("options", VerificationOptions{}, "VerificationOptions()"),
-             py::call_guard<WithoutGil>(),
-             "Step 3 for one candidate: matching, then RANSAC with a fixed seed.");
+  module.def(
+      "verify",
+      [](const Features& query, const Features& place, const VerificationOptions& options) {
+        return verify(query, place, options);
+      },
+      py::arg("query"), py::arg("place"),
+      py::arg_v("options", VerificationOptions{}, "VerificationOptions()"),
+      py::call_guard<WithoutGil>(),
+      "Step 3 for one candidate: matching, then RANSAC with a fixed seed.");
 }
 
 }  // namespace

@@ -106,8 +106,9 @@ void add_motion_flags(CLI::App& command, RunFlags& flags) {
       command
           .add_option(
               "--camera", flags.camera,
-              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): measures the "
-              "relative pose of each loop for relative_poses.csv. Default: the one in a "
+              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): matches have to "
+              "agree with a motion of this camera, also through a fisheye, and "
+              "relative_poses.csv gets the relative pose of each loop. Default: the one in a "
               "KITTI or EuRoC folder, camera.yaml in the folder, or camera_info in a recording")
           ->type_name("FILE");
   CLI::Option* depth =
@@ -156,7 +157,8 @@ void add_motion_flags(CLI::App& command, RunFlags& flags) {
       ->type_name("M")
       ->check(number(1e-4, 1e4))
       ->needs(right);
-  command.add_flag("--no-poses", flags.no_poses, "Measure no relative poses")
+  command
+      .add_flag("--no-poses", flags.no_poses, "Use no calibration and measure no relative poses")
       ->excludes(camera)
       ->excludes(depth)
       ->excludes(right);

@@ -141,7 +141,7 @@ void CandidateVerifier::verify_in_full(Frame& frame, std::size_t i, bool even_if
   VerifiedCandidate& v = frame.verified[i];
   v.geometry =
       geometry_of(frame.query, v.candidate.place, looks_[i], verifications_[i], even_if_chance);
-  if (v.geometry && v.geometry->evidence() > kChanceInliers) {
+  if (v.geometry && v.geometry->excess() > 0) {
     frame.note_promising(spot_of(v), verifications_[i]);
   }
 }
@@ -153,11 +153,13 @@ std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& que
                                                                 bool even_if_chance) {
   const Features& features = places_.features(place);
   verifier_.match(query.features, features, look, result);
-  CandidateGeometry geometry{.matches = static_cast<int>(result.matches.size())};
+  CandidateGeometry geometry{
+      .matches = static_cast<int>(result.matches.size()),
+      .chance_inliers = chance_inliers(query.features, features, query.camera)};
   if (options_.decision.count_matches) return geometry;
   const double most = geometry.matches * inlier_worth(1.0, query.view_inliers);
-  if (most <= kChanceInliers && !even_if_chance) return std::nullopt;
-  verifier_.find_geometry(query.features, features, result);
+  if (most <= geometry.chance_inliers && !even_if_chance) return std::nullopt;
+  verifier_.find_geometry(query.features, features, result, query.camera);
   geometry.inliers = static_cast<int>(result.inliers.size());
   geometry.distinct_inliers = result.distinct_inliers;
   geometry.inlier_worth = inlier_worth(result.explained_share, query.view_inliers);

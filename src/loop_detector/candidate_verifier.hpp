@@ -24,9 +24,14 @@ struct CandidateGeometry {
   int distinct_inliers = 0;
   double inlier_worth = 1;  ///< 0 to 1, see inlier_worth()
   double distinctness = 1;  ///< 0 to 1, see distinctness()
+  int chance_inliers = 8;   ///< see chance_inliers(); that of pixels
 
   /// That it shows the same place, in distinct inliers that count in full.
   [[nodiscard]] double evidence() const { return distinct_inliers * inlier_worth * distinctness; }
+  /// The part of `share` of it that is more than chance; negative below.
+  [[nodiscard]] double excess(double share = 1) const {
+    return share * evidence() - chance_inliers;
+  }
 };
 
 /// One candidate of one frame.
@@ -48,13 +53,11 @@ double inlier_worth(double explained_share, int view_inliers);
 /// nothing from frame to frame but its memory.
 class CandidateVerifier {
  public:
-  /// Evidence up to this number of inliers is chance: 7 matches always have a geometry.
-  static constexpr double kChanceInliers = 8;
-
   struct Query {
     const Features& features;
     int view_inliers = 0;  ///< see inlier_worth()
     bool closely = false;  ///< the first look matches all keypoints, not only the strongest
+    const CameraModel* camera = nullptr;  ///< see epipolar_inliers()
   };
 
   /// What is known of places.

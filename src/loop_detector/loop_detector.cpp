@@ -166,6 +166,7 @@ class LoopDetector::Impl {
 
     // Step 1: what the image is recognised by.
     const cv::Mat1b gray = gray_image(image);
+    if (camera_) check_size(*camera_, "The calibration of set_camera()", gray.size());
     seen.saliency = saliency_map(gray, options_.binary_content);
     seen.content = binarize(seen.saliency, options_.binary_content.gamma, excluded_);
     detection.times.content_ms = stopwatch.lap_ms();
@@ -218,7 +219,7 @@ class LoopDetector::Impl {
     Evidence evidence{seen.content, seen.saliency, {}};
     if (detection.inliers == 0) return evidence;
     const Features& place = features(seen.best->candidate.place, seen);
-    const Verification result = verify(seen.features, place, options_.verification);
+    const Verification result = verify(seen.features, place, options_.verification, camera());
     evidence.inliers.reserve(result.inliers.size());
     for (const Match& match : result.inliers) {
       evidence.inliers.push_back(
@@ -317,6 +318,17 @@ class LoopDetector::Impl {
     }
     excluded_ = excluded_pixels(mask);
     mask_ = mask.clone();
+  }
+
+  /// See LoopDetector::set_camera.
+  void set_camera(const std::optional<CameraModel>& camera) {
+    if (camera) validate(*camera, "The calibration of set_camera()");
+    if (camera && camera->size_px.empty()) {
+      throw Error(ErrorKind::input,
+                  "The calibration of set_camera() does not say how large its images are; give one "
+                  "with its size_px.");
+    }
+    camera_ = camera;
   }
 
   /// See LoopDetector::remove.
@@ -453,9 +465,12 @@ class LoopDetector::Impl {
     return index_.add(content);
   }
 
-  static CandidateVerifier::Query verified_query(const Observation& seen) {
-    return {seen.features, seen.view_inliers, seen.closely};
+  [[nodiscard]] CandidateVerifier::Query verified_query(const Observation& seen) const {
+    return {seen.features, seen.view_inliers, seen.closely, camera()};
   }
+
+  /// Null = not known.
+  [[nodiscard]] const CameraModel* camera() const { return camera_ ? &*camera_ : nullptr; }
 
   /// The paper knows nothing of them.
   void remove_attached_parts(Observation& seen) const {
@@ -492,7 +507,7 @@ class LoopDetector::Impl {
     if (seen.compared != place) {
       const Features& recent = features(place, seen);
       work.verifier.match(seen.features, recent, work.verification);
-      work.verifier.find_geometry(seen.features, recent, work.verification);
+      work.verifier.find_geometry(seen.features, recent, work.verification, camera());
       seen.compared = place;
     }
     return work.verification;
@@ -664,7 +679,7 @@ class LoopDetector::Impl {
     if (options_.decision.count_matches) {
       return v.geometry->matches >= options_.decision.min_score ? 1 : 0;
     }
-    return place_filter_.probability_alone(v.geometry->evidence(), steps_before(end));
+    return place_filter_.probability_alone(*v.geometry, steps_before(end));
   }
 
   /// What the frame tells of those before it.
@@ -727,6 +742,7 @@ class LoopDetector::Impl {
   mutable SurestPaths paths_;  ///< only process() asks for them, which is not const
   cv::Mat1b mask_;             ///< of all images; empty = none
   BinaryContent excluded_;     ///< by the mask
+  std::optional<CameraModel> camera_;
   PlaceIndex index_;
   PlaceMemory memory_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
@@ -789,6 +805,10 @@ Detection LoopDetector::skip(std::optional<double> timestamp_s,
 }
 
 void LoopDetector::set_mask(const cv::Mat& mask) { impl_->set_mask(mask); }
+
+void LoopDetector::set_camera(const std::optional<CameraModel>& camera) {
+  impl_->set_camera(camera);
+}
 
 void LoopDetector::remove(const SessionFrame& place) { impl_->remove(place); }
 

@@ -290,10 +290,11 @@ double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null) const {
 /// The tail of wrong places is a Lomax distribution: an exponential one whose mean is only as well
 /// known as the map is large. Geometry chose the candidate among all steps, which is why their
 /// number counts.
-double PlaceFilter::geometry_log_ratio(double evidence, std::ptrdiff_t num_steps) const {
+double PlaceFilter::geometry_log_ratio(const CandidateGeometry& geometry,
+                                       std::ptrdiff_t num_steps) const {
   const auto steps = static_cast<double>(std::max<std::ptrdiff_t>(1, num_steps));
   const double known = std::min(1.0, std::log1p(steps) / std::log1p(kFullSteps));
-  const double excess = known * evidence - CandidateVerifier::kChanceInliers;
+  const double excess = geometry.excess(known);
   if (excess <= 0) return 0;
   const double rate = tail_.seen / (tail_.seen + tail_.unseen);
   const double at_beginning =
@@ -303,8 +304,9 @@ double PlaceFilter::geometry_log_ratio(double evidence, std::ptrdiff_t num_steps
          std::max(0.0, growth + std::min(1.0, excess / kFullExcess) * at_beginning);
 }
 
-double PlaceFilter::probability_alone(double evidence, std::ptrdiff_t num_steps) const {
-  const double ratio = std::min(kMaxLogRatio, geometry_log_ratio(evidence, num_steps));
+double PlaceFilter::probability_alone(const CandidateGeometry& geometry,
+                                      std::ptrdiff_t num_steps) const {
+  const double ratio = std::min(kMaxLogRatio, geometry_log_ratio(geometry, num_steps));
   return 1 / (1 + std::exp(-ratio) / from_anywhere(num_steps));
 }
 
@@ -318,8 +320,8 @@ std::vector<PlaceFilter::Observed> PlaceFilter::observe(
     Observed o{.candidate = verified[i].candidate, .step = verified[i].step, .sigmas = sigmas[i]};
     if (num_similar >= kMinNull) o.votes = votes_log_ratio(sigmas[i], num_similar);
     if (verified[i].geometry) {
-      o.evidence = verified[i].geometry->evidence();
-      o.geometry = geometry_log_ratio(o.evidence, num_steps);
+      o.excess = verified[i].geometry->excess();
+      o.geometry = geometry_log_ratio(*verified[i].geometry, num_steps);
     }
     observed.push_back(o);
   }
@@ -392,10 +394,9 @@ void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& nex
   if (middle && update.probability > 0.5) {
     std::erase_if(wrong, [&](const Observed& o) { return is_near(o.step, *middle, loops); });
   }
-  double most = 0;
-  for (const Observed& o : wrong) most = std::max(most, o.evidence);
+  double excess = 0;
+  for (const Observed& o : wrong) excess = std::max(excess, o.excess);
   const double weight = 1 - update.revisit;
-  const double excess = most - CandidateVerifier::kChanceInliers;
   if (excess > 0) {
     next.tail.seen += weight;
     next.tail.count += weight;

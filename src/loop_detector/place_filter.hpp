@@ -38,7 +38,7 @@ class PlaceFilter {
     double votes = 0;     ///< log likelihood ratio of its displacement votes
     double geometry = 0;  ///< the same of its inliers
     double sigmas = 0;    ///< votes in standard deviations of the null; 0 where there is no null
-    double evidence = 0;  ///< CandidateGeometry::evidence, 0 if it was not looked at closer
+    double excess = 0;    ///< of CandidateGeometry, 0 if it was not looked at closer
 
     [[nodiscard]] double log_likelihood_ratio() const;
   };
@@ -101,9 +101,9 @@ class PlaceFilter {
                               std::size_t num_similar, const Steps& known,
                               const KnownLoops& loops) const;
 
-  /// The probability that a place is right which shows so much `evidence`, see CandidateGeometry,
-  /// if nothing else is known.
-  [[nodiscard]] double probability_alone(double evidence, std::ptrdiff_t num_steps) const;
+  /// The probability that a place is right which shows this, if nothing else is known.
+  [[nodiscard]] double probability_alone(const CandidateGeometry& geometry,
+                                         std::ptrdiff_t num_steps) const;
 
   /// What commit() changes.
   struct Next {
@@ -142,7 +142,8 @@ class PlaceFilter {
   [[nodiscard]] double mean_shown(std::ptrdiff_t step) const;
   [[nodiscard]] double independence() const;
   [[nodiscard]] double votes_log_ratio(double sigmas, std::size_t num_null) const;
-  [[nodiscard]] double geometry_log_ratio(double evidence, std::ptrdiff_t num_steps) const;
+  [[nodiscard]] double geometry_log_ratio(const CandidateGeometry& geometry,
+                                          std::ptrdiff_t num_steps) const;
   void learn(const Update& update, const KnownLoops& loops, Next& next) const;
 
   Belief before_;  ///< predicted for the last step

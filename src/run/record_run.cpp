@@ -129,10 +129,19 @@ cv::Mat1b mask_of(RunInput& input, const RunRequest& request) {
                           request.mask, mask.cols, mask.rows, size_px.width, size_px.height));
 }
 
+/// What a run reads beside its images, checked against the first of them.
+struct Inputs {
+  cv::Mat1b mask;
+  std::optional<CameraModel> camera;
+  LengthSources lengths;
+  std::optional<OdometryFile> odometry;
+};
+
 LoopDetector make_detector(const RunRequest& request, std::shared_ptr<MapStorage> map,
-                           const cv::Mat1b& mask) {
+                           const Inputs& inputs) {
   LoopDetector detector(request.options, std::move(map));
-  detector.set_mask(mask);
+  detector.set_mask(inputs.mask);
+  detector.set_camera(inputs.camera);
   return detector;
 }
 
@@ -208,14 +217,6 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
   return {folder, request.overwrite || is_unanswered(folder), inputs};
 }
 
-/// What a run reads beside its images, checked against the first of them.
-struct Inputs {
-  cv::Mat1b mask;
-  std::optional<CameraModel> camera;
-  LengthSources lengths;
-  std::optional<OdometryFile> odometry;
-};
-
 /// A run, from its folder to its end.
 class RecordedRun {
  public:
@@ -227,7 +228,7 @@ class RecordedRun {
         odometry_(std::move(inputs.odometry)),
         frames_(std::move(expected)),
         map_(open_map(input, request)),
-        detector_(make_detector(request, map_, inputs.mask)),
+        detector_(make_detector(request, map_, inputs)),
         record_(record_of(input, request)),
         folder_(make_folder(input, request, map_ ? map_->session() : 0)) {
     if (map_) record_.map_session = map_->session();

@@ -15,17 +15,19 @@ void constrain(const PairSamples& samples, SampleLane (&rows)[kSamplePairs][9]) 
     for (std::size_t lane = 0; lane < kSampleLanes; ++lane) {
       const double x0 = samples.x0[pair][lane];
       const double y0 = samples.y0[pair][lane];
+      const double z0 = samples.z0[pair][lane];
       const double x1 = samples.x1[pair][lane];
       const double y1 = samples.y1[pair][lane];
+      const double z1 = samples.z1[pair][lane];
       row[0][lane] = x1 * x0;
       row[1][lane] = x1 * y0;
-      row[2][lane] = x1;
+      row[2][lane] = x1 * z0;
       row[3][lane] = y1 * x0;
       row[4][lane] = y1 * y0;
-      row[5][lane] = y1;
-      row[6][lane] = x0;
-      row[7][lane] = y0;
-      row[8][lane] = 1.0;
+      row[5][lane] = y1 * z0;
+      row[6][lane] = z1 * x0;
+      row[7][lane] = z1 * y0;
+      row[8][lane] = z1 * z0;
     }
   }
 }
@@ -140,14 +142,38 @@ void score_block(const float* __restrict model, const float* __restrict x0,
   for (std::size_t i = 0; i < kPairBlock; ++i) is_inlier[i] = static_cast<std::uint8_t>(inlier[i]);
 }
 
-EpipolarScore epipolar_score(const float* model, const PointPairs& pairs, float max_error_sq,
-                             std::uint8_t* is_inlier) {
-  float costs[kPairBlock] = {};
-  std::int32_t inliers[kPairBlock] = {};
-  for (std::size_t i = 0; i < pairs.count; i += kPairBlock) {
-    score_block(model, pairs.x0 + i, pairs.y0 + i, pairs.x1 + i, pairs.y1 + i, max_error_sq,
-                static_cast<std::int32_t>(pairs.count - i), costs, inliers, is_inlier + i);
+/// As score_block(), for directions.
+// NOLINTNEXTLINE(readability-function-size)
+void score_ray_block(const float* __restrict model, const float* __restrict x0,
+                     const float* __restrict y0, const float* __restrict z0,
+                     const float* __restrict x1, const float* __restrict y1,
+                     const float* __restrict z1, const float* __restrict spread_sq0,
+                     const float* __restrict spread_sq1, float xy_scale_sq, float max_error_sq,
+                     std::int32_t left, float* __restrict costs, std::int32_t* __restrict inliers,
+                     std::uint8_t* __restrict is_inlier) {
+  std::int32_t inlier[kPairBlock];
+  for (std::int32_t i = 0; i < static_cast<std::int32_t>(kPairBlock); ++i) {
+    const float ax = model[0] * x0[i] + model[1] * y0[i] + model[2] * z0[i];
+    const float ay = model[3] * x0[i] + model[4] * y0[i] + model[5] * z0[i];
+    const float az = model[6] * x0[i] + model[7] * y0[i] + model[8] * z0[i];
+    const float bx = model[0] * x1[i] + model[3] * y1[i] + model[6] * z1[i];
+    const float by = model[1] * x1[i] + model[4] * y1[i] + model[7] * z1[i];
+    const float bz = model[2] * x1[i] + model[5] * y1[i] + model[8] * z1[i];
+    const float error = x1[i] * ax + y1[i] * ay + z1[i] * az;
+    const float gradient_sq = spread_sq1[i] * (xy_scale_sq * (ax * ax + ay * ay) + az * az) +
+                              spread_sq0[i] * (xy_scale_sq * (bx * bx + by * by) + bz * bz);
+    const float error_sq = error * error;
+    const bool is_near = error_sq < max_error_sq * gradient_sq;
+    const float distance_sq = error_sq / (is_near ? gradient_sq : 1.0F);
+    const float cost = is_near ? distance_sq : max_error_sq;
+    costs[i] += i < left ? cost : 0.0F;
+    inlier[i] = (is_near ? 1 : 0) & (i < left ? 1 : 0);
   }
+  for (std::size_t i = 0; i < kPairBlock; ++i) inliers[i] += inlier[i];
+  for (std::size_t i = 0; i < kPairBlock; ++i) is_inlier[i] = static_cast<std::uint8_t>(inlier[i]);
+}
+
+EpipolarScore sum_of(const float* costs, const std::int32_t* inliers) {
   EpipolarScore score = {0.0F, 0};
   for (std::size_t i = 0; i < kPairBlock; ++i) {
     score.cost += costs[i];
@@ -156,7 +182,31 @@ EpipolarScore epipolar_score(const float* model, const PointPairs& pairs, float 
   return score;
 }
 
-constexpr EpipolarKernels kEpipolarKernels{solve_samples, epipolar_score};
+EpipolarScore epipolar_score(const float* model, const PointPairs& pairs, float max_error_sq,
+                             std::uint8_t* is_inlier) {
+  float costs[kPairBlock] = {};
+  std::int32_t inliers[kPairBlock] = {};
+  for (std::size_t i = 0; i < pairs.count; i += kPairBlock) {
+    score_block(model, pairs.x0 + i, pairs.y0 + i, pairs.x1 + i, pairs.y1 + i, max_error_sq,
+                static_cast<std::int32_t>(pairs.count - i), costs, inliers, is_inlier + i);
+  }
+  return sum_of(costs, inliers);
+}
+
+EpipolarScore ray_score(const float* model, const PointPairs& pairs, const RaySpreads& spreads,
+                        float max_error_sq, std::uint8_t* is_inlier) {
+  float costs[kPairBlock] = {};
+  std::int32_t inliers[kPairBlock] = {};
+  for (std::size_t i = 0; i < pairs.count; i += kPairBlock) {
+    score_ray_block(model, pairs.x0 + i, pairs.y0 + i, pairs.z0 + i, pairs.x1 + i, pairs.y1 + i,
+                    pairs.z1 + i, spreads.sq0 + i, spreads.sq1 + i, spreads.xy_scale_sq,
+                    max_error_sq, static_cast<std::int32_t>(pairs.count - i), costs, inliers,
+                    is_inlier + i);
+  }
+  return sum_of(costs, inliers);
+}
+
+constexpr EpipolarKernels kEpipolarKernels{solve_samples, epipolar_score, ray_score};
 
 }  // namespace
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
+#include <tuple>
 
 namespace loopbit {
 namespace {
@@ -13,6 +15,8 @@ namespace {
 constexpr int kMaxSamples = 500;
 constexpr double kConfidence = 0.999;
 constexpr int kRefits = 6;
+/// They have an essential matrix always.
+constexpr std::size_t kEssentialPairs = 5;
 
 /// Different numbers from 0 to n - 1, the same for each run.
 class Samples {
@@ -49,8 +53,10 @@ PairSamples gather(Samples& samples, const PointPairs& pairs) {
     for (std::size_t k = 0; k < kSamplePairs; ++k) {
       gathered.x0[k][lane] = pairs.x0[sample[k]];
       gathered.y0[k][lane] = pairs.y0[sample[k]];
+      gathered.z0[k][lane] = pairs.z0[sample[k]];
       gathered.x1[k][lane] = pairs.x1[sample[k]];
       gathered.y1[k][lane] = pairs.y1[sample[k]];
+      gathered.z1[k][lane] = pairs.z1[sample[k]];
     }
   }
   return gathered;
@@ -141,6 +147,21 @@ int samples_needed(int inliers, std::size_t pairs) {
 
 }  // namespace
 
+/// Room for the coordinates of `count` pairs, all of them 0: x, y and z of both images, and
+/// spreads.
+std::array<float*, 8> EpipolarRansac::make_room(std::size_t count) {
+  is_inlier_.assign((count / kPairBlock + 1) * kPairBlock, 0);
+  std::array<float*, 8> arrays{};
+  coordinates_.assign(arrays.size() * is_inlier_.size(), 0.0F);
+  for (std::size_t i = 0; i < arrays.size(); ++i) {
+    arrays[i] = coordinates_.data() + i * is_inlier_.size();
+  }
+  const auto [x0, y0, z0, x1, y1, z1, spread_sq0, spread_sq1] = arrays;
+  pairs_ = {x0, y0, z0, x1, y1, z1, count};
+  spreads_ = {};
+  return arrays;
+}
+
 void EpipolarRansac::normalize(std::span<const Pair> pairs, double max_error_px) {
   Pair mean;
   for (const Pair& p : pairs) {
@@ -151,13 +172,7 @@ void EpipolarRansac::normalize(std::span<const Pair> pairs, double max_error_px)
   }
   const auto n = static_cast<float>(pairs.size());
   mean = {mean.x0 / n, mean.y0 / n, mean.x1 / n, mean.y1 / n};
-  const std::size_t stride = is_inlier_.size();
-  coordinates_.assign(4 * stride, 0.0F);
-  float* x0 = coordinates_.data();
-  float* y0 = x0 + stride;
-  float* x1 = y0 + stride;
-  float* y1 = x1 + stride;
-  pairs_ = {x0, y0, x1, y1, pairs.size()};
+  const auto [x0, y0, z0, x1, y1, z1, unused0, unused1] = make_room(pairs.size());
   float spread = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     x0[i] = pairs[i].x0 - mean.x0;
@@ -169,17 +184,56 @@ void EpipolarRansac::normalize(std::span<const Pair> pairs, double max_error_px)
   // One unit for both images, so that distances keep their proportion.
   const float unit = spread > 0 ? spread / (4 * n) : 1.0F;
   for (float& coordinate : coordinates_) coordinate /= unit;
+  std::fill_n(z0, pairs.size(), 1.0F);
+  std::fill_n(z1, pairs.size(), 1.0F);
   max_error_sq_ = static_cast<float>(max_error_px * max_error_px) / (unit * unit);
+}
+
+void EpipolarRansac::normalize(std::span<const ViewRayPair> pairs, double max_error_px) {
+  const auto [x0, y0, z0, x1, y1, z1, spread_sq0, spread_sq1] = make_room(pairs.size());
+  float spread = 0;
+  for (const auto& [a, b] : pairs) {
+    spread += std::abs(a.direction[0]) + std::abs(a.direction[1]);
+    spread += std::abs(b.direction[0]) + std::abs(b.direction[1]);
+  }
+  const float unit = spread > 0 ? spread / (4 * static_cast<float>(pairs.size())) : 1.0F;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const cv::Vec3f& a = pairs[i].first.direction;
+    const cv::Vec3f& b = pairs[i].second.direction;
+    std::tie(x0[i], y0[i], z0[i]) = std::tuple(a[0] / unit, a[1] / unit, a[2]);
+    std::tie(x1[i], y1[i], z1[i]) = std::tuple(b[0] / unit, b[1] / unit, b[2]);
+    spread_sq0[i] = pairs[i].first.spread_sq;
+    spread_sq1[i] = pairs[i].second.spread_sq;
+  }
+  spreads_ = {spread_sq0, spread_sq1, 1 / (unit * unit)};
+  max_error_sq_ = static_cast<float>(max_error_px * max_error_px);
 }
 
 EpipolarScore EpipolarRansac::score(const cv::Matx33d& model) {
   std::array<float, 9> elements{};
   std::transform(std::begin(model.val), std::end(model.val), elements.begin(),
                  [](double element) { return static_cast<float>(element); });
-  return kernels_.epipolar_score(elements.data(), pairs_, max_error_sq_, is_inlier_.data());
+  if (spreads_.sq0 == nullptr) {
+    return kernels_.epipolar_score(elements.data(), pairs_, max_error_sq_, is_inlier_.data());
+  }
+  return kernels_.ray_score(elements.data(), pairs_, spreads_, max_error_sq_, is_inlier_.data());
 }
 
-/// The sum over the inliers of r r^T, where r = (x1, y1, 1) times (x0, y0, 1), each element with
+/// What turns the algebraic error of a pair of rays into an angle, by the best model so far. The
+/// spread of rays over a sphere is too uneven to do without; that of pixels is not.
+double EpipolarRansac::fit_weight(std::size_t pair) const {
+  if (spreads_.sq0 == nullptr) return 1;
+  const cv::Vec3d first(pairs_.x0[pair], pairs_.y0[pair], pairs_.z0[pair]);
+  const cv::Vec3d second(pairs_.x1[pair], pairs_.y1[pair], pairs_.z1[pair]);
+  const auto size_sq = [&](const cv::Vec3d& gradient) {
+    return spreads_.xy_scale_sq * (gradient[0] * gradient[0] + gradient[1] * gradient[1]) +
+           gradient[2] * gradient[2];
+  };
+  return 1 / (spreads_.sq1[pair] * size_sq(best_ * first) +
+              spreads_.sq0[pair] * size_sq(best_.t() * second));
+}
+
+/// The sum over the inliers of r r^T, where r = (x1, y1, z1) times (x0, y0, z0), each element with
 /// each: its 81 elements are but 36 different sums.
 cv::Matx<double, 9, 9> EpipolarRansac::sum_of_squares() const {
   constexpr std::size_t kProducts = 6;
@@ -189,14 +243,18 @@ cv::Matx<double, 9, 9> EpipolarRansac::sum_of_squares() const {
     if (is_inlier_[k] == 0) continue;
     const double x0 = pairs_.x0[k];
     const double y0 = pairs_.y0[k];
+    const double z0 = pairs_.z0[k];
     const double x1 = pairs_.x1[k];
     const double y1 = pairs_.y1[k];
-    const std::array<double, kProducts> of_first{x0 * x0, x0 * y0, x0, y0 * y0, y0, 1.0};
-    const std::array<double, kProducts> of_second{x1 * x1, x1 * y1, x1, y1 * y1, y1, 1.0};
+    const double z1 = pairs_.z1[k];
+    const double weight = fit_weight(k);
+    const std::array<double, kProducts> of_first{x0 * x0, x0 * y0, x0 * z0,
+                                                 y0 * y0, y0 * z0, z0 * z0};
+    const std::array<double, kProducts> of_second{x1 * x1, x1 * y1, x1 * z1,
+                                                  y1 * y1, y1 * z1, z1 * z1};
     for (std::size_t i = 0; i < kProducts; ++i) {
-      for (std::size_t j = 0; j < kProducts; ++j) {
-        sums[i * kProducts + j] += of_second[i] * of_first[j];
-      }
+      const double weighted = weight * of_second[i];
+      for (std::size_t j = 0; j < kProducts; ++j) sums[i * kProducts + j] += weighted * of_first[j];
     }
   }
   cv::Matx<double, 9, 9> squares;
@@ -250,15 +308,53 @@ void EpipolarRansac::offer(const cv::Matx33d& model) {
 }
 
 int EpipolarRansac::find(std::span<const Pair> pairs, double max_error_px) {
-  pairs_.count = pairs.size();
-  is_inlier_.assign((pairs.size() / kPairBlock + 1) * kPairBlock, 0);
+  make_room(pairs.size());
   if (pairs.size() <= kSamplePairs) return 0;
   normalize(pairs, max_error_px);
-  best_score_ = {max_error_sq_ * static_cast<float>(pairs.size()), 0};
-  Samples samples(pairs.size());
+  return search();
+}
+
+/// Of the best matrix, whose inliers are known. Sampling is for matrices with seven degrees of
+/// freedom, which is much faster; those of a camera's motion have five.
+void EpipolarRansac::make_essential(std::span<const ViewRayPair> pairs, double max_error_px) {
+  const double unit = 1 / std::sqrt(static_cast<double>(spreads_.xy_scale_sq));
+  const cv::Matx33d by_unit(unit, 0, 0, 0, unit, 0, 0, 0, 1);
+  const cv::Matx33d by_inverse(1 / unit, 0, 0, 0, 1 / unit, 0, 0, 0, 1);
+  const double huber_px = max_error_px / 2;
+  best_score_ = {std::numeric_limits<float>::max(), 0};
+  ViewMotion motion;
+  constexpr int kRounds = 3;
+  for (int round = 0; round < kRounds; ++round) {
+    ray_inliers_.clear();
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      if (is_inlier_[i] != 0) ray_inliers_.push_back(pairs[i]);
+    }
+    if (ray_inliers_.size() < kEssentialPairs) return;
+    if (round == 0) motion = find_motion(ray_inliers_, by_inverse * best_ * by_inverse, huber_px);
+    refine_motion(ray_inliers_, huber_px, motion);
+    const cv::Matx33d model = by_unit * motion.essential() * by_unit;
+    const EpipolarScore refined = score(model);
+    if (refined.cost >= best_score_.cost) return;
+    best_ = model;
+    best_score_ = refined;
+  }
+}
+
+int EpipolarRansac::find(std::span<const ViewRayPair> pairs, double max_error_px) {
+  make_room(pairs.size());
+  if (pairs.size() <= kSamplePairs) return 0;
+  normalize(pairs, max_error_px);
+  if (search() == 0) return 0;
+  make_essential(pairs, max_error_px);
+  return score(best_).inliers;
+}
+
+int EpipolarRansac::search() {
+  best_score_ = {max_error_sq_ * static_cast<float>(pairs_.count), 0};
+  Samples samples(pairs_.count);
   EpipolarPencils pencils;
   std::array<cv::Matx33d, 3> models;
-  int needed = samples_needed(static_cast<int>(kSamplePairs) + 1, pairs.size());
+  int needed = samples_needed(static_cast<int>(kSamplePairs) + 1, pairs_.count);
   for (int i = 0; i < needed; ++i) {
     const std::size_t lane = static_cast<std::size_t>(i) % kSampleLanes;
     if (lane == 0) kernels_.solve_samples(gather(samples, pairs_), pencils);
@@ -266,7 +362,7 @@ int EpipolarRansac::find(std::span<const Pair> pairs, double max_error_px) {
     const int count = matrices_of(pencils, lane, models);
     for (int k = 0; k < count; ++k) offer(models[static_cast<std::size_t>(k)]);
     if (best_score_.inliers > before) {
-      needed = std::min(needed, samples_needed(best_score_.inliers, pairs.size()));
+      needed = std::min(needed, samples_needed(best_score_.inliers, pairs_.count));
     }
   }
   return best_score_.inliers > 0 ? score(best_).inliers : 0;

@@ -11,8 +11,16 @@
 namespace loopbit {
 namespace {
 
-/// Seven matches always have an epipolar geometry, so only more can speak for one.
+/// Seven matches always have a fundamental matrix, so only more can speak for one. It also leads to
+/// the essential matrix, which five matches always have.
 constexpr std::size_t kMinMatchesForGeometry = 8;
+constexpr int kChanceInliersOfPixels = 8;
+constexpr int kChanceInliersOfRays = 6;
+
+/// Whether the geometry of two images is one of rays.
+bool has_rays(const Features& query, const Features& place, const CameraModel* camera) {
+  return camera != nullptr && query.working_size_px == place.working_size_px;
+}
 
 const Keypoint& keypoint(const Features& features, int index) {
   return features.keypoints[static_cast<std::size_t>(index)];
@@ -22,6 +30,15 @@ EpipolarRansac::Pair pair_of(const Features& query, const Features& place, const
   const Keypoint& a = keypoint(query, match.query);
   const Keypoint& b = keypoint(place, match.place);
   return {a.x_px, a.y_px, b.x_px, b.y_px};
+}
+
+/// Of zeros where the lens has no ray; such pairs are no inliers of any geometry.
+ViewRay ray_of(const CameraModel& camera, const Keypoint& keypoint) {
+  cv::Matx32d turn;
+  const auto ray = unproject(camera, {keypoint.x_px, keypoint.y_px}, &turn);
+  if (!ray) return {};
+  const double area = cv::norm(cv::Vec3d(turn.col(0).val).cross(cv::Vec3d(turn.col(1).val)));
+  return {cv::Vec3f(*ray), static_cast<float>(area)};
 }
 
 float moved_px(const EpipolarRansac::Pair& pair) {
@@ -57,8 +74,9 @@ class Geometry {
   explicit Geometry(InstructionSet instruction_set = active_instruction_set())
       : ransac_(instruction_set) {}
 
+  /// `camera`: of both images; null = not known.
   void find_inliers(const Features& query, const Features& place, std::span<const Match> matches,
-                    double max_error_px, std::vector<Match>& inliers) {
+                    double max_error_px, const CameraModel* camera, std::vector<Match>& inliers) {
     inliers.clear();
     if (matches.size() < kMinMatchesForGeometry) return;
     pairs_.clear();
@@ -67,7 +85,10 @@ class Geometry {
     // determined by, so that RANSAC may find none.
     const auto is_unmoved = [&](const auto& pair) { return moved_px(pair) <= max_error_px; };
     const auto unmoved = std::count_if(pairs_.begin(), pairs_.end(), is_unmoved);
-    const bool has_moved = ransac_.find(pairs_, max_error_px) >= unmoved;
+    const int found = has_rays(query, place, camera)
+                          ? ransac_.find(rays_of(query, place, matches, *camera), max_error_px)
+                          : ransac_.find(pairs_, max_error_px);
+    const bool has_moved = found >= unmoved;
     for (std::size_t i = 0; i < matches.size(); ++i) {
       if (has_moved ? ransac_.is_inlier()[i] != 0 : is_unmoved(pairs_[i])) {
         inliers.push_back(matches[i]);
@@ -111,8 +132,21 @@ class Geometry {
   }
 
  private:
+  std::span<const ViewRayPair> rays_of(const Features& query, const Features& place,
+                                       std::span<const Match> matches,
+                                       const CameraModel& calibrated) {
+    const CameraModel camera = resized(calibrated, query.working_size_px);
+    rays_.clear();
+    for (const Match& match : matches) {
+      rays_.push_back({ray_of(camera, keypoint(query, match.query)),
+                       ray_of(camera, keypoint(place, match.place))});
+    }
+    return rays_;
+  }
+
   EpipolarRansac ransac_;
   std::vector<EpipolarRansac::Pair> pairs_;
+  std::vector<ViewRayPair> rays_;
   std::vector<Match> distinct_;
   std::vector<float> x_px_;
   std::vector<float> y_px_;
@@ -149,10 +183,11 @@ class Verifier::Impl {
     clear_geometry(result);
   }
 
-  void find_geometry(const Features& query, const Features& place, Verification& result) {
+  void find_geometry(const Features& query, const Features& place, const CameraModel* camera,
+                     Verification& result) {
     clear_geometry(result);
     if (result.matches.size() < static_cast<std::size_t>(options_.min_matches)) return;
-    geometry_.find_inliers(query, place, result.matches, options_.max_epipolar_error_px,
+    geometry_.find_inliers(query, place, result.matches, options_.max_epipolar_error_px, camera,
                            result.inliers);
     result.distinct_inliers =
         geometry_.count_distinct(query, place, result.inliers, options_.min_spacing_scales);
@@ -195,8 +230,9 @@ void Verifier::match_some(const Features& query, std::span<const int> asked, con
   impl_->match_some(query, asked, place, result);
 }
 
-void Verifier::find_geometry(const Features& query, const Features& place, Verification& result) {
-  impl_->find_geometry(query, place, result);
+void Verifier::find_geometry(const Features& query, const Features& place, Verification& result,
+                             const CameraModel* camera) {
+  impl_->find_geometry(query, place, camera, result);
 }
 
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio) {
@@ -206,10 +242,15 @@ std::vector<Match> match_features(const Features& query, const Features& place, 
 }
 
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
-                                    const std::vector<Match>& matches, double max_error_px) {
+                                    const std::vector<Match>& matches, double max_error_px,
+                                    const CameraModel* camera) {
   std::vector<Match> inliers;
-  Geometry().find_inliers(query, place, matches, max_error_px, inliers);
+  Geometry().find_inliers(query, place, matches, max_error_px, camera, inliers);
   return inliers;
+}
+
+int chance_inliers(const Features& query, const Features& place, const CameraModel* camera) {
+  return has_rays(query, place, camera) ? kChanceInliersOfRays : kChanceInliersOfPixels;
 }
 
 int distinct_inliers(const Features& query, const Features& place,
@@ -222,11 +263,11 @@ double explained_share(const Features& query, const std::vector<Match>& inliers)
 }
 
 Verification verify(const Features& query, const Features& place,
-                    const VerificationOptions& options) {
+                    const VerificationOptions& options, const CameraModel* camera) {
   Verifier verifier(options);
   Verification result;
   verifier.match(query, place, result);
-  verifier.find_geometry(query, place, result);
+  verifier.find_geometry(query, place, result, camera);
   return result;
 }
 

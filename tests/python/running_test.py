@@ -50,6 +50,21 @@ def test_a_mask_is_that_of_the_command(command, dataset, images, tmp_path):
     assert detector.process(images[0][:100]).frame == len(images)
 
 
+def test_a_camera_is_that_of_the_command(command, dataset, images, tmp_path):
+    calibration = dataset / "camera.yaml"
+    command("run", dataset / "images", "--out", tmp_path / "cpp", "--camera", calibration,
+            "--no-report")
+    command("run", dataset / "images", "--out", tmp_path / "plain", "--no-poses", "--no-report")
+    detector = loopbit.LoopDetector()
+    detector.set_camera(loopbit.read_cameras(calibration)[0])
+    assert [as_row(detector.process(image)) for image in images] == decisions(tmp_path / "cpp")
+    assert decisions(tmp_path / "plain") != decisions(tmp_path / "cpp")
+    with pytest.raises(loopbit.InputError, match="set_camera.* 320 x 100"):
+        detector.process(images[0][:100])
+    detector.set_camera(None)
+    assert detector.process(images[0][:100]).frame == len(images)
+
+
 def test_finished_run(run):
     assert run.positions_m.shape == (120, 3) and run.truth.same_place.size > 0
     array = loopbit.detections_array(run.detections)

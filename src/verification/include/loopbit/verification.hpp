@@ -10,6 +10,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "loopbit/camera.hpp"
 #include "loopbit/instruction_set.hpp"
 #include "loopbit/options.hpp"
 #include "loopbit/surf.hpp"
@@ -87,11 +88,20 @@ struct FirstLook {
 /// query features) back. No distances are stored.
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio);
 
-/// The largest set of `matches` that fits one fundamental matrix, found by RANSAC with a fixed
-/// seed, or that did not move at all. Empty below 8 matches, because 7 always fit. The same input
-/// gives the same inliers.
+/// The largest set of `matches` that fits one epipolar geometry, found by RANSAC with a fixed seed,
+/// or that did not move at all. Empty below 8 matches, because 7 always fit. The same input gives
+/// the same inliers.
+///
+/// `camera`: of both images, which are resized versions of it. The geometry is then an essential
+/// matrix of rays, which every lens has; an error is an angle, of `max_error_px` at the keypoints.
+/// Without a camera, or if the images differ in size, it is a fundamental matrix of pixels.
 std::vector<Match> epipolar_inliers(const Features& query, const Features& place,
-                                    const std::vector<Match>& matches, double max_error_px);
+                                    const std::vector<Match>& matches, double max_error_px,
+                                    const CameraModel* camera = nullptr);
+
+/// So many inliers are chance: one more than the matches that always have such a geometry. These
+/// are 7 for a fundamental matrix, and 5 for an essential one.
+int chance_inliers(const Features& query, const Features& place, const CameraModel* camera);
 
 /// Counts the inliers that lie apart in both images, greedily in their order: at least
 /// `min_spacing_scales` times the smaller scale of two keypoints. Keypoints with overlapping
@@ -137,8 +147,9 @@ class Verifier {
                   Verification& result);
 
   /// Sets the other fields from `result.matches`. Leaves them empty if there are fewer than
-  /// min_matches.
-  void find_geometry(const Features& query, const Features& place, Verification& result);
+  /// min_matches. `camera`: see epipolar_inliers().
+  void find_geometry(const Features& query, const Features& place, Verification& result,
+                     const CameraModel* camera = nullptr);
 
  private:
   class Impl;
@@ -147,6 +158,6 @@ class Verifier {
 
 /// Step 3 for one candidate: match_features, epipolar_inliers, distinct_inliers, explained_share.
 Verification verify(const Features& query, const Features& place,
-                    const VerificationOptions& options = {});
+                    const VerificationOptions& options = {}, const CameraModel* camera = nullptr);
 
 }  // namespace loopbit
