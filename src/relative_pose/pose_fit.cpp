@@ -32,30 +32,63 @@ cv::Matx33d cross_matrix(const cv::Vec3d& v) {
   return {0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0};
 }
 
+/// A pose, and its inverse rotation and translation: what residuals need of it.
+struct PoseFrame {
+  explicit PoseFrame(const RigidPose& pose)
+      : rotation(pose.rotation), back(pose.rotation.t()), translation(back * pose.translation) {}
+
+  cv::Matx33d rotation;
+  cv::Matx33d back;
+  cv::Vec3d translation;  ///< in the frame of the query's camera
+};
+
+/// Products that the compiler keeps in registers, which it does not with those of cv::Matx.
+cv::Vec3d times(const cv::Matx33d& a, const cv::Vec3d& v) {
+  const double* m = a.val;
+  return {m[0] * v[0] + m[1] * v[1] + m[2] * v[2], m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
+          m[6] * v[0] + m[7] * v[1] + m[8] * v[2]};
+}
+
+cv::Vec3d times(const cv::Matx32d& a, const cv::Vec2d& v) {
+  const double* m = a.val;
+  return {m[0] * v[0] + m[1] * v[1], m[2] * v[0] + m[3] * v[1], m[4] * v[0] + m[5] * v[1]};
+}
+
+cv::Vec3d transposed_times(const cv::Matx33d& a, const cv::Vec3d& v) {
+  const double* m = a.val;
+  return {m[0] * v[0] + m[3] * v[1] + m[6] * v[2], m[1] * v[0] + m[4] * v[1] + m[7] * v[2],
+          m[2] * v[0] + m[5] * v[1] + m[8] * v[2]};
+}
+
+cv::Vec2d transposed_times(const cv::Matx32d& a, const cv::Vec3d& v) {
+  const double* m = a.val;
+  return {m[0] * v[0] + m[2] * v[1] + m[4] * v[2], m[1] * v[0] + m[3] * v[1] + m[5] * v[2]};
+}
+
 /// match . (translation x rotation query) = 0, divided by its standard deviation. Near the epipole
 /// that deviation depends strongly on the pose, so its derivative counts, too.
-Residual epipolar_residual(const RayPair& pair, const RigidPose& pose) {
+Residual epipolar_residual(const RayPair& pair, const PoseFrame& pose) {
   // All in the frame of the query's camera.
-  const cv::Matx33d back = pose.rotation.t();
   const cv::Vec3d& q = pair.query.direction;
-  const cv::Vec3d m = back * pair.match.direction;
-  const cv::Vec3d t = back * pose.translation;
+  const cv::Vec3d m = times(pose.back, pair.match.direction);
+  const cv::Vec3d& t = pose.translation;
   const cv::Vec3d normal_of_query = t.cross(q);
   const cv::Vec3d normal_of_match = m.cross(t);
   // The noise of each keypoint across the other's epipolar line.
-  const cv::Matx32d match_spread = back * pair.match.spread;
-  const cv::Vec2d by_match = match_spread.t() * normal_of_query;
-  const cv::Vec2d by_query = pair.query.spread.t() * normal_of_match;
+  const cv::Vec2d by_match =
+      transposed_times(pair.match.spread, times(pose.rotation, normal_of_query));
+  const cv::Vec2d by_query = transposed_times(pair.query.spread, normal_of_match);
   const double sigma = std::sqrt(by_match.dot(by_match) + by_query.dot(by_query));
   if (!(sigma > 0)) return {};
-  const double value = m.dot(normal_of_query) / sigma;
-  const cv::Vec3d match_pull = match_spread * by_match * (1 / sigma);
-  const cv::Vec3d query_pull = pair.query.spread * by_query * (1 / sigma);
+  const double scale = 1 / sigma;
+  const double value = m.dot(normal_of_query) * scale;
+  const cv::Vec3d match_pull = times(pose.back, times(pair.match.spread, by_match)) * scale;
+  const cv::Vec3d query_pull = times(pair.query.spread, by_query) * scale;
   const cv::Vec3d sigma_by_translation = q.cross(match_pull) + query_pull.cross(m);
   const cv::Vec3d sigma_by_rotation =
       q.cross(match_pull.cross(t)) + query_pull.cross(normal_of_match);
-  const cv::Vec3d by_translation = (q.cross(m) - value * sigma_by_translation) / sigma;
-  const cv::Vec3d by_rotation = (q.cross(normal_of_match) - value * sigma_by_rotation) / sigma;
+  const cv::Vec3d by_translation = (q.cross(m) - value * sigma_by_translation) * scale;
+  const cv::Vec3d by_rotation = (q.cross(normal_of_match) - value * sigma_by_rotation) * scale;
   Residual residual;
   residual.size = 1;
   residual.value = {value, 0};
@@ -85,9 +118,9 @@ cv::Matx22d whitening(const cv::Matx22d& covariance) {
 /// ray, divided by the standard deviations. These depend on the pose, too. So the derivative is
 /// taken at the likeliest point, between the one that was measured and the query's ray (the
 /// envelope theorem).
-Residual point_residual(const RayPair& pair, const RigidPose& pose) {
-  const cv::Matx33d back = pose.rotation.t();
-  const cv::Vec3d t = back * pose.translation;
+Residual point_residual(const RayPair& pair, const PoseFrame& pose) {
+  const cv::Matx33d& back = pose.back;
+  const cv::Vec3d& t = pose.translation;
   const cv::Vec3d m = back * pair.match.direction;
   const cv::Vec3d& q = pair.query.direction;
   Residual residual;
@@ -129,6 +162,15 @@ Residual point_residual(const RayPair& pair, const RigidPose& pose) {
   return residual;
 }
 
+/// Whether the residual of a pair is one equation, without a point.
+bool is_epipolar(const RayPair& pair, FitKind kind) {
+  return kind == FitKind::direction || (kind == FitKind::metric && !pair.has_depth());
+}
+
+Residual residual_of(const RayPair& pair, const PoseFrame& pose, FitKind kind) {
+  return is_epipolar(pair, kind) ? epipolar_residual(pair, pose) : point_residual(pair, pose);
+}
+
 RigidPose moved(const RigidPose& pose, const cv::Vec6d& step, FitKind kind) {
   RigidPose result;
   result.rotation = pose.rotation * rotation_by({step[3], step[4], step[5]});
@@ -146,10 +188,11 @@ struct Equations {
 
 Equations equations_of(std::span<const RayPair> pairs, const std::vector<char>& is_used,
                        const RigidPose& pose, FitKind kind) {
+  const PoseFrame frame(pose);
   Equations sum;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (is_used[i] == 0) continue;
-    const Residual residual = residual_of(pairs[i], pose, kind);
+    const Residual residual = residual_of(pairs[i], frame, kind);
     const double error = std::sqrt(residual.norm_sq());
     const double weight = error <= kHuber ? 1.0 : kHuber / error;
     sum.cost += error <= kHuber ? error * error : kHuber * (2 * error - kHuber);
@@ -271,16 +314,14 @@ cv::Matx33d rotation_by(const cv::Vec3d& r) {
 }
 
 Residual residual_of(const RayPair& pair, const RigidPose& pose, FitKind kind) {
-  const bool has_point = kind == FitKind::metric && pair.has_depth();
-  if (kind == FitKind::rotation || has_point) return point_residual(pair, pose);
-  return epipolar_residual(pair, pose);
+  return residual_of(pair, PoseFrame(pose), kind);
 }
 
 double epipolar_error_sq(const RayPair& pair, const cv::Matx33d& essential) {
-  const cv::Vec3d normal = essential * pair.query.direction;
-  const cv::Vec3d back_normal = essential.t() * pair.match.direction;
-  const cv::Vec2d by_match = pair.match.spread.t() * normal;
-  const cv::Vec2d by_query = pair.query.spread.t() * back_normal;
+  const cv::Vec3d normal = times(essential, pair.query.direction);
+  const cv::Vec3d back_normal = transposed_times(essential, pair.match.direction);
+  const cv::Vec2d by_match = transposed_times(pair.match.spread, normal);
+  const cv::Vec2d by_query = transposed_times(pair.query.spread, back_normal);
   const double error = pair.match.direction.dot(normal);
   const double variance = by_match.dot(by_match) + by_query.dot(by_query);
   return variance > 0 ? error * error / variance : std::numeric_limits<double>::max();
@@ -297,8 +338,12 @@ PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind
   std::vector<char> is_used(pairs.size());
   const auto gate_pairs = [&] {
     fit.cost = 0;
+    const PoseFrame frame(fit.pose);
+    const cv::Matx33d essential = essential_matrix(fit.pose);
     for (std::size_t i = 0; i < pairs.size(); ++i) {
-      const double error_sq = residual_of(pairs[i], fit.pose, kind).norm_sq();
+      const double error_sq = is_epipolar(pairs[i], kind)
+                                  ? epipolar_error_sq(pairs[i], essential)
+                                  : point_residual(pairs[i], frame).norm_sq();
       is_used[i] = error_sq <= gate * gate ? 1 : 0;
       fit.cost += std::min(error_sq, gate * gate);
     }

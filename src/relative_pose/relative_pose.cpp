@@ -166,17 +166,18 @@ class RelativePoseEstimator::Impl {
     if (result.status == PoseStatus::no_geometry) return result;
     // With depths, the length.
     if (is_length_asked) estimate_metric(request, result);
+    if (result.known == PoseKnown::direction) check_parallax(result);
     return result;
   }
 
  private:
   [[nodiscard]] double gate() const { return options_.max_error_px / kUsualSigma_px; }
 
+  /// All but the covariance, which takes as long as the rest.
   static void report(const PoseFit& fit, FitKind kind, std::span<const RayPair> inliers,
                      RelativePose& result) {
     const double scale = residual_scale(inliers, fit.pose, kind);
     result.T_match_query = matrix_of(fit.pose);
-    result.covariance = covariance_of(inliers, fit.pose, kind);
     result.rms_px = scale * kUsualSigma_px;
     result.inliers.clear();
     for (const RayPair& pair : inliers) result.inliers.push_back(pair.features);
@@ -194,6 +195,7 @@ class RelativePoseEstimator::Impl {
     direction_cost_ = fit.cost;
     if (found->rival) starts_.push_back(found->rival->pose);
     report(fit, FitKind::direction, inliers_, result);
+    direction_ = fit.pose;
     result.status = PoseStatus::measured;
     result.known = PoseKnown::direction;
     name_degenerate_case(*found, result);
@@ -207,6 +209,7 @@ class RelativePoseEstimator::Impl {
     if (static_cast<double>(turned.size()) > kMinShare * static_cast<double>(inliers_.size())) {
       starts_ = {turn.pose};
       report(turn, FitKind::rotation, turned, result);
+      result.covariance = covariance_of(turned, turn.pose, FitKind::rotation);
       result.status = PoseStatus::pure_rotation;
       result.known = PoseKnown::rotation;
       return;
@@ -222,8 +225,14 @@ class RelativePoseEstimator::Impl {
     if (found.rival && found.rival->cost < kMaxWorse * found.best.cost) {
       result.status = PoseStatus::ambiguous;
       result.known = PoseKnown::nothing;
-      return;
     }
+  }
+
+  /// Sets the covariance of a direction, and whether it is known at all. Not again for one that has
+  /// a covariance.
+  void check_parallax(RelativePose& result) const {
+    if (result.covariance != cv::Matx66d::zeros()) return;
+    result.covariance = covariance_of(inliers_, direction_, FitKind::direction);
     constexpr double kDegrees = 180 / std::numbers::pi;
     if (largest_sigma(result.covariance, 0) * kDegrees > options_.max_direction_deg) {
       result.status = PoseStatus::little_parallax;
@@ -260,13 +269,14 @@ class RelativePoseEstimator::Impl {
     const auto inliers = inliers_of(pairs_, fit->pose, FitKind::metric, gate());
     const auto points = std::ranges::count_if(inliers, &RayPair::has_depth);
     if (points < kMinPoints || static_cast<int>(inliers.size()) < options_.min_inliers) return;
-    if (has_metric_rival_ || contradicts_directions(fit->pose, result.status)) {
+    if (has_metric_rival_ || contradicts_directions(fit->pose, result)) {
       result.status = PoseStatus::ambiguous;
       result.known = PoseKnown::nothing;
       return;
     }
     RelativePose metric = result;
     report(*fit, FitKind::metric, inliers, metric);
+    metric.covariance = covariance_of(inliers, fit->pose, FitKind::metric);
     if (largest_sigma(metric.covariance, 0) > options_.max_position_share * distance_m(inliers)) {
       return;
     }
@@ -280,11 +290,12 @@ class RelativePoseEstimator::Impl {
   /// Whether a pose with a length explains the rays much worse than the best direction does: then
   /// the fit of the points stopped in a wrong minimum, or their depths are wrong. Without parallax
   /// there is no direction to compare with.
-  [[nodiscard]] bool contradicts_directions(const RigidPose& pose, PoseStatus directions) const {
-    if (directions == PoseStatus::pure_rotation || directions == PoseStatus::little_parallax) {
-      return false;
-    }
-    return truncated_cost(essential_matrix(pose), pairs_, gate()) > kMaxWorse * direction_cost_;
+  [[nodiscard]] bool contradicts_directions(const RigidPose& pose, RelativePose& directions) const {
+    if (directions.status == PoseStatus::pure_rotation) return false;
+    const double cost = truncated_cost(essential_matrix(pose), pairs_, gate());
+    if (cost <= kMaxWorse * direction_cost_) return false;
+    if (directions.known == PoseKnown::direction) check_parallax(directions);
+    return directions.status != PoseStatus::little_parallax;
   }
 
   static double distance_m(std::span<const RayPair> inliers) {
@@ -336,6 +347,7 @@ class RelativePoseEstimator::Impl {
   std::vector<RayPair> pairs_;
   std::vector<RayPair> inliers_;  ///< of the direction
   bool has_metric_rival_ = false;
+  RigidPose direction_;  ///< with a translation of length 1
   double direction_cost_ = 0;
   std::vector<RigidPose> starts_;  ///< what the directions say, best first
 };
