@@ -311,6 +311,8 @@ class RightImagesTest : public DepthFolderTest {
     options.frames = 150;
     options.laps = 2;
     options.spacing_m = 1.5;
+    options.width_px = 320;
+    options.height_px = 240;
     World world(options);
     write_dataset(world, path("town"));
     std::filesystem::create_directory(path("right"));
