@@ -106,9 +106,9 @@ void add_motion_flags(CLI::App& command, RunFlags& flags) {
       command
           .add_option(
               "--camera", flags.camera,
-              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): matches have to "
-              "agree with a motion of this camera, also through a fisheye, and "
-              "relative_poses.csv gets the relative pose of each loop. Default: the one in a "
+              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): "
+              "relative_poses.csv gets the relative pose of each loop, and a fisheye finds more "
+              "loops. Default: the one in a "
               "KITTI or EuRoC folder, camera.yaml in the folder, or camera_info in a recording")
           ->type_name("FILE");
   CLI::Option* depth =

@@ -50,8 +50,10 @@ def test_a_mask_is_that_of_the_command(command, dataset, images, tmp_path):
     assert detector.process(images[0][:100]).frame == len(images)
 
 
-def test_a_camera_is_that_of_the_command(command, dataset, images, tmp_path):
-    calibration = dataset / "camera.yaml"
+def test_a_fisheye_is_that_of_the_command(command, dataset, images, tmp_path):
+    calibration = tmp_path / "fisheye.yaml"
+    pinhole = (dataset / "camera.yaml").read_text()
+    calibration.write_text(pinhole.replace("plumb_bob", "equidistant"))
     command("run", dataset / "images", "--out", tmp_path / "cpp", "--camera", calibration,
             "--no-report")
     command("run", dataset / "images", "--out", tmp_path / "plain", "--no-poses", "--no-report")
