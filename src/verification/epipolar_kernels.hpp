@@ -73,9 +73,8 @@ struct EpipolarKernels {
   EpipolarScore (*epipolar_score)(const float* model, const PointPairs& pairs, float max_error_sq,
                                   std::uint8_t* is_inlier);
   /// The same for directions: Sampson's distance on the sphere, in pixels at both of them.
-  EpipolarScore (*ray_score)(const float* model, const PointPairs& pairs,
-                             const RaySpreads& spreads, float max_error_sq,
-                             std::uint8_t* is_inlier);
+  EpipolarScore (*ray_score)(const float* model, const PointPairs& pairs, const RaySpreads& spreads,
+                             float max_error_sq, std::uint8_t* is_inlier);
 };
 
 }  // namespace loopbit

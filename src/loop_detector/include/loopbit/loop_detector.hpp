@@ -103,10 +103,10 @@ class LoopDetector {
   /// whole image, or Error (kind input) if it has less than 32 x 32 pixels. Copies it.
   void set_mask(const cv::Mat& mask);
 
-  /// The calibration of all images from now on, also of those in the map. Matches then have to agree
-  /// with an epipolar geometry of rays, so that a fisheye is no obstacle. An image of another size
-  /// is an Error (kind input). The map does not store it. None = not known, as in the beginning.
-  /// Throws Error (kind input) if it cannot be right or has no size_px.
+  /// The calibration of all images from now on, also of those in the map. Matches then have to
+  /// agree with an epipolar geometry of rays, so that a fisheye is no obstacle. An image of another
+  /// size is an Error (kind input). The map does not store it. None = not known, as in the
+  /// beginning. Throws Error (kind input) if it cannot be right or has no size_px.
   void set_camera(const std::optional<CameraModel>& camera);
 
   /// Removes a place, such as a culled key frame, also from the map. From now on it is no candidate
