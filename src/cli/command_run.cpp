@@ -100,30 +100,8 @@ int run_command(RunFlags& flags, const Arguments& arguments) {
                      flags.session);
 }
 
-/// Adds the flags for camera, depth, stereo and odometry.
-void add_motion_flags(CLI::App& command, RunFlags& flags) {
-  CLI::Option* camera =
-      command
-          .add_option(
-              "--camera", flags.camera,
-              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): "
-              "relative_poses.csv gets the relative pose of each loop, and a fisheye finds more "
-              "loops. Default: the one in a "
-              "KITTI or EuRoC folder, camera.yaml in the folder, or camera_info in a recording")
-          ->type_name("FILE");
-  CLI::Option* depth =
-      command
-          .add_option("--depth", flags.session.run.depth,
-                      "Depth images, so that relative poses are in metres: a folder with names "
-                      "like those of the images, or a TUM RGB-D folder with its depth.txt")
-          ->type_name("DIR");
-  command
-      .add_option("--depth-scale", flags.session.run.depth_scale,
-                  "Units per metre of 16-bit depth images; most sensors: 1000")
-      ->type_name("N")
-      ->capture_default_str()
-      ->check(number(1e-3, 1e6))
-      ->needs(depth);
+/// Adds the flags for odometry.
+void add_odometry_flags(CLI::App& command, RunFlags& flags) {
   CLI::Option* odometry =
       command
           .add_option(
@@ -143,6 +121,32 @@ void add_motion_flags(CLI::App& command, RunFlags& flags) {
       "After the run, correct the trajectory by a pose graph of odometry and loops, and "
       "withdraw the loops that it rejects: writes corrected.tum, graph.g2o, "
       "judged_loops.csv and trajectory.csv");
+}
+
+/// Adds the flags for camera, depth and stereo.
+void add_camera_flags(CLI::App& command, RunFlags& flags) {
+  CLI::Option* camera =
+      command
+          .add_option(
+              "--camera", flags.camera,
+              "Calibration of the images (EuRoC, Kalibr, ROS, OpenCV, KITTI): "
+              "relative_poses.csv gets the relative pose of each loop, and a fisheye finds more "
+              "loops. Default: the one in a KITTI or EuRoC folder, camera.yaml in the folder, or "
+              "camera_info in a recording")
+          ->type_name("FILE");
+  CLI::Option* depth =
+      command
+          .add_option("--depth", flags.session.run.depth,
+                      "Depth images, so that relative poses are in metres: a folder with names "
+                      "like those of the images, or a TUM RGB-D folder with its depth.txt")
+          ->type_name("DIR");
+  command
+      .add_option("--depth-scale", flags.session.run.depth_scale,
+                  "Units per metre of 16-bit depth images; most sensors: 1000")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(number(1e-3, 1e6))
+      ->needs(depth);
   CLI::Option* right =
       command
           .add_option("--right", flags.session.run.right,
@@ -193,7 +197,8 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   add_mask_flag(*command, flags->session.run.mask);
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
-  add_motion_flags(*command, *flags);
+  add_camera_flags(*command, *flags);
+  add_odometry_flags(*command, *flags);
   command->footer(list_truth_settings());
   command->callback(
       [flags, &arguments, &exit_code] { exit_code = run_command(*flags, arguments); });
