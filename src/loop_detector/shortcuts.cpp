@@ -56,8 +56,7 @@ void SurestPaths::begin() {
 std::optional<Motion> SurestPaths::from(int frame, const OdometryTrack::Frame& now,
                                         const Motion& direct) {
   if (version_ != shortcuts_.version()) begin();
-  const auto onward =
-      surest_.empty() && queue_.empty() ? std::nullopt : track_.to_next(latest_, now);
+  const auto onward = shortcuts_.ends().empty() ? std::nullopt : track_.to_next(latest_, now);
   if (!onward) return std::nullopt;
   double least = doubt(direct);
   search(least);
