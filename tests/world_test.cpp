@@ -14,6 +14,7 @@
 
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "loopbit/error.hpp"
 
@@ -185,12 +186,75 @@ TEST(WorldFloors, PlacesOfOtherFloorsAreOthers) {
   EXPECT_FALSE(same.empty());
   const std::set<Pair> near = pairs_of(world.near_place());
   for (const auto& [query, frame] : near) {
-    EXPECT_LE(std::abs(world.pose(query).z_m - world.pose(frame).z_m), 2.5);
+    EXPECT_LE(std::abs(world.pose(query).z_m - world.pose(frame).z_m), 1);
+  }
+  for (const auto& [query, frame] : same) {
+    EXPECT_EQ(world.pose(query).z_m, world.pose(frame).z_m);
+    EXPECT_EQ(std::remainder(world.pose(query).z_m, 3), 0) << "on a ramp";
   }
   EXPECT_TRUE(std::ranges::includes(near, same));
-  // The first lap on each floor has none, but for the ramp, the second has.
+  // The first lap on each floor has none, the second has, but for the ramp.
   EXPECT_FALSE(queries_of(world.near_place()).contains(250));
-  EXPECT_TRUE(queries_of(world.same_place()).contains(350));
+  const std::set<int> queries = queries_of(world.same_place());
+  EXPECT_TRUE(queries.contains(350));
+  EXPECT_FALSE(world.blank(350));
+  EXPECT_TRUE(world.blank(390));
+  EXPECT_GT(*queries.lower_bound(373), 490) << "on the next floor";
+  EXPECT_TRUE(near.contains({375, 275})) << "where the ramp begins";
+  EXPECT_FALSE(near.contains({390, 290}));
+}
+
+/// How well one view of a still world foretells another by its depths and the poses of both.
+double foretold(const World& world, int from, int to) {
+  const cv::Mat1f depth_m = world.depth_m(from);
+  const CameraModel a = world.camera(from);
+  const CameraModel b = world.camera(to);
+  const cv::Matx44d T_to_from = world.T_world_camera(to).inv() * world.T_world_camera(from);
+  cv::Mat1f x(depth_m.size(), -1.0F);
+  cv::Mat1f y(depth_m.size(), -1.0F);
+  cv::Mat1b is_seen(depth_m.size(), std::uint8_t{0});
+  for (int row = 0; row < depth_m.rows; ++row) {
+    for (int column = 0; column < depth_m.cols; ++column) {
+      const auto depth = static_cast<double>(depth_m(row, column));
+      if (depth <= 0 || depth > 40) continue;
+      const cv::Vec4d at = T_to_from * cv::Vec4d((column - a.cx) / a.fx * depth,
+                                                 (row - a.cy) / a.fy * depth, depth, 1);
+      if (at[2] < 1) continue;
+      x(row, column) = static_cast<float>(b.cx + b.fx * at[0] / at[2]);
+      y(row, column) = static_cast<float>(b.cy + b.fy * at[1] / at[2]);
+      const cv::Rect2f image(1, 1, static_cast<float>(depth_m.cols - 3),
+                             static_cast<float>(depth_m.rows - 3));
+      is_seen(row, column) = image.contains({x(row, column), y(row, column)}) ? 1 : 0;
+    }
+  }
+  cv::Mat warped;
+  cv::remap(gray(world.render(to)), warped, x, y, cv::INTER_LINEAR);
+  const cv::Mat seen = gray(world.render(from));
+  cv::Mat1d pairs(0, 2);
+  for (int row = 0; row < depth_m.rows; ++row) {
+    for (int column = 0; column < depth_m.cols; ++column) {
+      if (is_seen(row, column) == 0) continue;
+      pairs.push_back(
+          cv::Mat1d(cv::Matx12d(seen.at<float>(row, column), warped.at<float>(row, column))));
+    }
+  }
+  EXPECT_GT(pairs.rows, depth_m.rows * depth_m.cols / 10) << from << ' ' << to;
+  return correlation(pairs.col(0), pairs.col(1));
+}
+
+TEST(WorldFloors, PlacesThatAreTheSameAreSeenWhereTheirPosesSay) {
+  WorldOptions options = small_tower();
+  options.moving_objects = 0;
+  options.noise = 0;
+  options.light_change = 0;
+  const World world(options);
+  int pairs = 0;
+  for (const PlaceRun& run : world.same_place()) {
+    if (run.query % 3 != 0) continue;
+    EXPECT_GT(foretold(world, run.query, run.last), 0.6) << run.query << ' ' << run.last;
+    ++pairs;
+  }
+  EXPECT_GT(pairs, 60);
 }
 
 TEST(WorldFloors, BadOptionsAreNamed) {

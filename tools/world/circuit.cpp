@@ -131,7 +131,8 @@ void Circuit::measure(double length_m) {
 void Circuit::place_blanks(double share) {
   if (share <= 0) return;
   const int stretches = std::max(1, floor_int(share * length_m_ / kUsualBlank_m + 0.5));
-  blank_half_m_ = share * length_m_ / stretches / 2;
+  // Corners are not spread evenly, so a whole circuit needs longer stretches.
+  blank_half_m_ = share < 1 ? share * length_m_ / stretches / 2 : length_m_;
   for (int i = 0; i < stretches; ++i) {
     int piece = piece_at(length_m_ * (i + 0.5) / stretches);
     while (turn_at(piece) == 0) ++piece;

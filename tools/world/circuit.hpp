@@ -42,6 +42,7 @@ class Circuit {
   static constexpr double kCornerRadius_m = 8.0;
   static constexpr double kShortestCircuit_m = 106.0;
 
+  /// `blank_share`: 0 to 1; with 1, all of it is blank.
   Circuit(std::uint32_t seed, double length_m, double blank_share);
 
   [[nodiscard]] double length_m() const { return length_m_; }

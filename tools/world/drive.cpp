@@ -37,9 +37,13 @@ double Drive::on_floor_m(int frame) const { return driven_m(frame) - floor(frame
 
 int Drive::lap(int frame) const { return floor_int(driven_m(frame) / circuit_.length_m()); }
 
+bool Drive::on_ramp(int frame) const {
+  return floor(frame) < floors_ - 1 && on_floor_m(frame) > floor_m_ - kRamp_m;
+}
+
 double Drive::height_m(int frame) const {
   const int floor = this->floor(frame);
-  if (floor == floors_ - 1) return kStorey_m * floor;
+  if (!on_ramp(frame)) return kStorey_m * floor;
   const double on_ramp = (on_floor_m(frame) - (floor_m_ - kRamp_m)) / kRamp_m;
   const auto share = static_cast<double>(smooth_step(clamp01(static_cast<float>(on_ramp))));
   return kStorey_m * (floor + share);
@@ -49,7 +53,7 @@ double Drive::along_m(int frame) const {
   return reversed(frame) ? -driven_m(frame) : driven_m(frame);
 }
 
-bool Drive::blank(int frame) const { return circuit_.blank_at(along_m(frame)); }
+bool Drive::blank(int frame) const { return on_ramp(frame) || circuit_.blank_at(along_m(frame)); }
 
 // After the first lap the camera moves to its new line gradually, and back on the next floor.
 double Drive::line_m(int frame, double ahead_m) const {

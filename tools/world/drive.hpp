@@ -15,9 +15,13 @@ class Drive {
   Drive(const WorldOptions& options, const Circuit& circuit);
 
   [[nodiscard]] int lap(int frame) const;
+  [[nodiscard]] int floor(int frame) const;
+  /// Whether the camera is on its way from `floor` to the next.
+  [[nodiscard]] bool on_ramp(int frame) const;
   /// Above the lowest floor.
   [[nodiscard]] double height_m(int frame) const;
   [[nodiscard]] double driven_m(int frame) const { return frame * spacing_m_; }
+  /// Between plain walls, as the ramps are.
   [[nodiscard]] bool blank(int frame) const;
   [[nodiscard]] StreetPoint camera(int frame) const;
 
@@ -29,7 +33,6 @@ class Drive {
   [[nodiscard]] StreetPoint ahead(int frame, double ahead_m, double left_m) const;
 
  private:
-  [[nodiscard]] int floor(int frame) const;
   [[nodiscard]] double on_floor_m(int frame) const;
   [[nodiscard]] double along_m(int frame) const;
   [[nodiscard]] bool reversed(int frame) const { return reverse_second_ && lap(frame) == 1; }

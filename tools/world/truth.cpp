@@ -11,6 +11,8 @@
 namespace loopbit::town {
 namespace {
 
+constexpr double kSameHeight_m = 1.0;  // much less than a storey
+
 /// Frames by square of the plane. Squares are as wide as the rule reaches, so that nine of them
 /// contain all frames that can match.
 class Squares {
@@ -45,7 +47,8 @@ class Squares {
 bool same_place(const View& a, const View& b, const PlaceRule& rule) {
   const Vec2 apart = a.at - b.at;
   if (dot(apart, apart) > rule.distance_m * rule.distance_m) return false;
-  if (std::abs(a.height_m - b.height_m) > rule.height_m) return false;
+  if (!rule.ramps && (a.on_ramp || b.on_ramp)) return false;
+  if (std::abs(a.height_m - b.height_m) > kSameHeight_m) return false;
   const double cos_turn = dot(a.forward, b.forward);
   return (rule.opposite ? std::abs(cos_turn) : cos_turn) >= rule.cos_turn;
 }

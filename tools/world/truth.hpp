@@ -16,7 +16,7 @@ struct PlaceRule {
   double cos_turn = 0.866;  // of the angle between the headings, at least
   bool opposite = false;    // or between one heading and the opposite of the other
   int frames_between = 50;  // at least
-  double height_m = 1.0;    // between the camera centres, at most
+  bool ramps = false;       // whether a ramp is near the floors that it joins
 };
 
 /// All pairs that follow the rule, as runs; see World::same_place(). views[i].forward is a unit
@@ -25,6 +25,7 @@ struct View {
   Vec2 at;
   Vec2 forward;
   double height_m = 0.0;
+  bool on_ramp = false;
 };
 std::vector<PlaceRun> find_places(const std::vector<View>& views, const PlaceRule& rule);
 

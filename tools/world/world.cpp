@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -37,8 +38,6 @@ constexpr double kNodFrames = 3.0;  // between two nods
 constexpr double kDrivenBetween_m = 50.0;
 constexpr double kCosSame = 0.8660254037844386;  // 30 degrees
 constexpr double kCosNear = 0.5;                 // 60 degrees
-constexpr double kSameHeight_m = 1.0;
-constexpr double kNearHeight_m = 2.5;  // less than a storey
 constexpr double kFramesPerSecond = 10.0;
 constexpr double kRadPerDeg = std::numbers::pi / 180;
 
@@ -47,6 +46,7 @@ constexpr float kNightGrey = 0.9F;   // share of the colour that is lost
 
 constexpr std::uint32_t kNodSalt = 0x40dU;
 constexpr std::uint32_t kNoiseSalt = 0x4015eU;
+constexpr std::uint32_t kRampSalt = 0x4a3bU;
 
 double largest_spacing_m() {
   double largest = 0;
@@ -116,7 +116,9 @@ struct World::Plan {
                 options.blank_stretch),
         drive(options, circuit),
         town(seed, circuit, options.look_alike),
-        traffic(seed, circuit, drive, options.moving_objects) {}
+        traffic(seed, circuit, drive, options.moving_objects) {
+    if (options.floors > 1) ramp_circuit.emplace(seed, circuit.length_m(), 1.0);
+  }
   Plan(const Plan&) = delete;
   Plan& operator=(const Plan&) = delete;
   Plan(Plan&&) = delete;
@@ -124,18 +126,21 @@ struct World::Plan {
   ~Plan() = default;
 
   [[nodiscard]] Camera camera(int frame) const;
+  /// What is around the camera: the town, or plain walls on a ramp, other ones on each.
+  [[nodiscard]] Town town_of(int frame) const;
   [[nodiscard]] Scene scene(int frame, Vec2 eye) const;
   [[nodiscard]] float from_second_lap(int frame, double factor) const {
     return drive.lap(frame) > 0 ? static_cast<float>(factor) : 0.0F;
   }
   [[nodiscard]] std::vector<View> views() const;
-  [[nodiscard]] PlaceRule rule(double distance_m, double cos_turn, double height_m) const;
+  [[nodiscard]] PlaceRule rule(double distance_m, double cos_turn, bool ramps) const;
   void draw(int frame, const Camera& camera, FisheyeLens::Image& columns) const;
   void store(int frame, int column, const std::vector<Color>& rows, cv::Mat& image) const;
 
   WorldOptions options;
   std::uint32_t seed;
   Circuit circuit;
+  std::optional<Circuit> ramp_circuit;  // with floors
   Drive drive;
   Town town;
   Traffic traffic;
@@ -156,10 +161,15 @@ Camera World::Plan::camera(int frame) const {
   return camera;
 }
 
+Town World::Plan::town_of(int frame) const {
+  if (!drive.on_ramp(frame)) return town;
+  return {hash_of(seed ^ kRampSalt, drive.floor(frame)), *ramp_circuit, options.look_alike};
+}
+
 Scene World::Plan::scene(int frame, Vec2 eye) const {
   Scene scene;
-  town.add_surroundings(eye, scene);
-  traffic.add_to(frame, scene);
+  town_of(frame).add_surroundings(eye, scene);
+  if (!drive.on_ramp(frame)) traffic.add_to(frame, scene);
   const float season = from_second_lap(frame, options.season);
   if (season > 0) change_season(scene, season);
   return scene;
@@ -170,23 +180,24 @@ std::vector<View> World::Plan::views() const {
   views.reserve(static_cast<std::size_t>(options.frames));
   for (int frame = 0; frame < options.frames; ++frame) {
     const Camera at = camera(frame);
-    views.push_back({at.eye, at.forward, drive.height_m(frame)});
+    views.push_back({at.eye, at.forward, drive.height_m(frame), drive.on_ramp(frame)});
   }
   return views;
 }
 
-PlaceRule World::Plan::rule(double distance_m, double cos_turn, double height_m) const {
+PlaceRule World::Plan::rule(double distance_m, double cos_turn, bool ramps) const {
   return {distance_m, cos_turn, options.opposite_counts,
-          static_cast<int>(std::ceil(kDrivenBetween_m / options.spacing_m)), height_m};
+          static_cast<int>(std::ceil(kDrivenBetween_m / options.spacing_m)), ramps};
 }
 
 /// What a pinhole camera at a place of `frame` sees: columns, of rows.
 void World::Plan::draw(int frame, const Camera& camera, FisheyeLens::Image& columns) const {
+  const Town around_town = town_of(frame);
   const Scene around = scene(frame, camera.eye);
   const Light light = light_of_lap(seed, drive.lap(frame), options.light_change,
                                    from_second_lap(frame, options.night));
   const ColumnTracer tracer(camera, around);
-  Shader shader(camera, around, town, light, seed);
+  Shader shader(camera, around, around_town, light, seed);
   std::vector<Piece> pieces;
   columns.assign(static_cast<std::size_t>(camera.width_px),
                  std::vector<Color>(static_cast<std::size_t>(camera.height_px)));
@@ -307,15 +318,16 @@ cv::Mat World::render(int frame, double right_m) const {
 double World::time_s(int frame) { return frame / kFramesPerSecond; }
 
 std::vector<PlaceRun> World::same_place() const {
-  return find_places(plan_->views(), plan_->rule(options().same_place_m, kCosSame, kSameHeight_m));
+  return find_places(plan_->views(), plan_->rule(options().same_place_m, kCosSame, false));
 }
 
 std::vector<PlaceRun> World::near_place() const {
-  return find_places(plan_->views(), plan_->rule(options().near_place_m, kCosNear, kNearHeight_m));
+  return find_places(plan_->views(), plan_->rule(options().near_place_m, kCosNear, true));
 }
 
 std::size_t World::storage_bytes() const noexcept {
-  return sizeof(Plan) + plan_->circuit.storage_bytes();
+  const auto& ramps = plan_->ramp_circuit;
+  return sizeof(Plan) + plan_->circuit.storage_bytes() + (ramps ? ramps->storage_bytes() : 0);
 }
 
 }  // namespace loopbit

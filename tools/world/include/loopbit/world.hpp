@@ -22,7 +22,8 @@ namespace loopbit {
 /// The built-in world: a camera drives through a town on one closed circuit. The length of the
 /// circuit follows from frames, spacing_m, laps and floors: a ring around one block, or many
 /// kilometres through the town. It never crosses itself. With floors, the drive goes on in a second
-/// town that stands on the first one and looks the same, and so on, up a ramp each time.
+/// town that stands on the first one and looks the same, and so on. The last 30 m on each floor are
+/// a ramp between plain walls, which the camera sees only then.
 struct WorldOptions {
   int frames = 400;
   int seed = 1;
@@ -59,7 +60,8 @@ struct WorldOptions {
         Field{"laps", &W::laps, 1.0, 1000.0, "Number of laps, on each floor"},
         Field{
             "floors", &W::floors, 1, 100,
-            "Storeys of 3 m with the same streets and houses; a ramp leads from each to the next"},
+            "Storeys of 3 m with the same streets and houses; a walled ramp leads from each to the "
+            "next"},
         Field{"spacing_m", &W::spacing_m, 0.02, 20.0,
               "Distance driven between two frames (0.1 s), m"},
         Field{"lateral_offset_m", &W::lateral_offset_m, 0.0, 3.0,
@@ -123,7 +125,7 @@ class World {
   [[nodiscard]] Pose pose(int frame) const;
   [[nodiscard]] static double time_s(int frame);
 
-  /// Whether `frame` lies between the plain walls.
+  /// Whether `frame` lies between plain walls, as on ramps.
   [[nodiscard]] bool blank(int frame) const;
 
   /// The camera of `frame`. It is level, and its nods shift the principal point.
@@ -142,14 +144,16 @@ class World {
   [[nodiscard]] cv::Mat1f depth_m(int frame) const;
 
   /// All pairs of frames that show the same place: camera centres at most same_place_m apart,
-  /// headings at most 30 degrees apart (or 30 degrees from opposite, if opposite_counts), heights
-  /// at most 1 m apart, and at least 50 m driven in between, so that the view just passed is not a
-  /// revisit. Sorted by query, then first; the runs of a query neither touch nor overlap. The time
-  /// is linear in the frames for a given number of laps; the same holds for near_place().
+  /// headings at most 30 degrees apart (or 30 degrees from opposite, if opposite_counts), on the
+  /// same floor, and at least 50 m driven in between, so that the view just passed is not a
+  /// revisit. Frames on ramps have none. Sorted by query, then first; the runs of a query neither
+  /// touch nor overlap. The time is linear in the frames for a given number of laps; the same holds
+  /// for near_place().
   [[nodiscard]] std::vector<PlaceRun> same_place() const;
 
-  /// All pairs of frames whose match is not wrong: as same_place(), but at most near_place_m, 60
-  /// degrees and 2.5 m of height apart. Contains same_place().
+  /// All pairs of frames whose match is not wrong: as same_place(), but at most near_place_m and 60
+  /// degrees apart, and on ramps, too, if their heights differ by at most 1 m. Contains
+  /// same_place().
   [[nodiscard]] std::vector<PlaceRun> near_place() const;
 
   /// Heap memory in bytes. It grows with the circuit, not with the frames.
