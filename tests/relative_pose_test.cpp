@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/relative_pose.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <ostream>
@@ -12,7 +13,11 @@
 #include <gtest/gtest.h>
 #include <opencv2/core.hpp>
 
+#include "loopbit/kernels_for.hpp"
+
+#include "direction_kernels.hpp"
 #include "pose_fit.hpp"
+#include "ray_blocks.hpp"
 #include "test_cameras.hpp"
 #include "test_support.hpp"
 
@@ -280,8 +285,7 @@ TEST(RelativePose, OnlyDepthMeasuresAPlane) {
             0.2);
 }
 
-/// It adds two estimates, and so is up to two times too large where the noise is independent, as
-/// here, but never too small.
+/// It is the mean of two estimates, increased for what few halves leave unknown.
 TEST(RelativePose, CovarianceCoversTheErrors) {
   constexpr int kScenes = 150;
   Random random;
@@ -354,6 +358,127 @@ TEST(RelativePose, EpipolarResidualsHaveTheirJacobians) {
       EXPECT_NEAR(at.jacobian(0, k), slope, 0.05 + 0.001 * std::abs(slope));
     }
   }
+}
+
+/// The first `count` pairs of a scene, and a pose beside the true one.
+std::vector<RayPair> some_pairs(const Scene& scene, int count) {
+  std::vector<RayPair> pairs;
+  for (int i = 0; i < count; ++i) {
+    pairs.push_back({.query = *ray_of({&scene.query, &scene.camera}, i),
+                     .match = *ray_of({&scene.match, &scene.camera}, i)});
+  }
+  return pairs;
+}
+
+constexpr float kOutlier = 0.03F;
+
+/// Lanes added up.
+struct PlainSums {
+  cv::Matx66d squares = cv::Matx66d::zeros();
+  cv::Vec6d gradient;
+  double likelihood = 1;
+};
+
+PlainSums sums_by_kernel(InstructionSet set, const DirectionPose& pose,
+                         const std::vector<RayPair>& pairs) {
+  DirectionSums lanes{};
+  std::ranges::fill(lanes.likelihood, 1.0);
+  kernels_for<DirectionKernels>(set).add_equations(pose, RayBlocks(pairs).arrays(), kOutlier,
+                                                   lanes);
+  PlainSums sums;
+  for (std::size_t lane = 0; lane < kRayBlock; ++lane) {
+    std::size_t entry = 0;
+    for (int a = 0; a < 6; ++a) {
+      sums.gradient[a] += static_cast<double>(lanes.gradient[a][lane]);
+      for (int b = 0; b <= a; ++b, ++entry) {
+        sums.squares(a, b) += static_cast<double>(lanes.squares[entry][lane]);
+      }
+    }
+    sums.likelihood *= lanes.likelihood[lane];
+  }
+  return sums;
+}
+
+/// Student's t distribution of 3 degrees of freedom, and outliers.
+PlainSums slow_sums(const RigidPose& pose, const std::vector<RayPair>& pairs) {
+  PlainSums sums;
+  for (const RayPair& pair : pairs) {
+    const Residual residual = residual_of(pair, pose, FitKind::direction);
+    const double inlier = std::pow(1 + residual.norm_sq() / 3, -2);
+    const double total = inlier + static_cast<double>(kOutlier);
+    const double weight = inlier / total * 4 / (3 + residual.norm_sq());
+    sums.likelihood *= total / (1 + static_cast<double>(kOutlier));
+    for (int a = 0; a < 6; ++a) {
+      const double weighted = weight * residual.jacobian(0, a);
+      sums.gradient[a] += weighted * residual.value[0];
+      for (int b = 0; b <= a; ++b) sums.squares(a, b) += weighted * residual.jacobian(0, b);
+    }
+  }
+  return sums;
+}
+
+TEST(RelativePose, EveryKernelAddsUpTheSlowEquations) {
+  Random random;
+  const Scene scene(points_in_space(100, random), fisheye(), usual_motion(), 1, random);
+  const RigidPose pose{scene.T_match_query.get_minor<3, 3>(0, 0) * rotation_by({0.01, 0.01, 0}),
+                       cv::normalize(translation_of(scene.T_match_query))};
+  const DirectionPose of_kernel = direction_pose(pose);
+  for (const int count : {1, 15, 16, 17, 100}) {
+    const auto pairs = some_pairs(scene, count);
+    const PlainSums slow = slow_sums(pose, pairs);
+    const PlainSums scalar = sums_by_kernel(InstructionSet::scalar, of_kernel, pairs);
+    EXPECT_LT(cv::norm(scalar.squares - slow.squares), 1e-3 * cv::norm(slow.squares)) << count;
+    EXPECT_LT(cv::norm(scalar.gradient - slow.gradient), 1e-3 * cv::norm(slow.gradient)) << count;
+    EXPECT_NEAR(std::log(scalar.likelihood), std::log(slow.likelihood), 1e-3 * count) << count;
+    for (const InstructionSet set : available_instruction_sets()) {
+      const PlainSums sums = sums_by_kernel(set, of_kernel, pairs);
+      EXPECT_EQ(cv::norm(sums.squares - scalar.squares), 0) << to_string(set);
+      EXPECT_EQ(cv::norm(sums.gradient - scalar.gradient), 0) << to_string(set);
+      EXPECT_EQ(sums.likelihood, scalar.likelihood) << to_string(set);
+    }
+  }
+}
+
+TEST(RelativePose, EveryKernelMeasuresTheSlowErrors) {
+  Random random;
+  const Scene scene(points_in_space(100, random), fisheye(), usual_motion(), 1, random);
+  const RigidPose pose{scene.T_match_query.get_minor<3, 3>(0, 0),
+                       cv::normalize(translation_of(scene.T_match_query))};
+  for (const int count : {1, 16, 17, 100}) {
+    const auto pairs = some_pairs(scene, count);
+    const RayBlocks blocks(pairs);
+    std::vector<float> scalar(blocks.arrays().stride);
+    const DirectionPose of_kernel = direction_pose(pose);
+    kernels_for<DirectionKernels>(InstructionSet::scalar)
+        .errors_sq(of_kernel, blocks.arrays(), scalar.data());
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const double slow = epipolar_error_sq(pairs[i], essential_matrix(pose));
+      EXPECT_NEAR(scalar[i], slow, 1e-3 * (1 + slow));
+    }
+    for (const InstructionSet set : available_instruction_sets()) {
+      std::vector<float> errors_sq(scalar.size());
+      kernels_for<DirectionKernels>(set).errors_sq(of_kernel, blocks.arrays(), errors_sq.data());
+      EXPECT_EQ(errors_sq, scalar) << to_string(set);
+    }
+  }
+}
+
+/// Few noisy matches, a third of them wrong, have several minima of about the same cost.
+TEST(RelativePose, RivalsCountInTheCovariance) {
+  constexpr int kScenes = 150;
+  Random random;
+  int measured = 0;
+  double sum = 0;
+  for (int i = 0; i < kScenes; ++i) {
+    Scene scene(points_in_space(45, random), pinhole(), usual_motion(), 1.5, random);
+    for (std::size_t k = 0; k < 15; ++k) scene.matches[k].place = random.between(0, 44);
+    const RelativePose pose = estimate(scene.request());
+    if (pose.known != PoseKnown::direction) continue;
+    ++measured;
+    sum += nees(pose, scene.T_match_query, 5) / 5;
+  }
+  EXPECT_GT(measured, kScenes / 3);
+  EXPECT_LT(sum / measured, 1.2);
 }
 
 TEST(RelativePose, InformationIsThatOfG2o) {

@@ -13,9 +13,10 @@
 namespace loopbit {
 namespace {
 
-constexpr int kStarts = 16;
-constexpr std::size_t kFewPairs = 50;
-constexpr std::size_t kRefined = 5;
+constexpr int kStarts = 64;
+constexpr std::size_t kFewPairs = 16;
+constexpr std::size_t kRefined = 12;
+constexpr int kFirstSteps = 8;
 constexpr std::size_t kMinInliers = 8;
 /// Before the pose is nearly right, pairs far from it count, too.
 constexpr double kWideGate = 1e3;
@@ -84,11 +85,12 @@ std::vector<cv::Vec3d> half_sphere(int count) {
   return directions;
 }
 
-/// At most `count` pairs, evenly.
-std::vector<RayPair> thinned(std::span<const RayPair> pairs, std::size_t count) {
-  if (pairs.size() <= count) return {pairs.begin(), pairs.end()};
-  std::vector<RayPair> result;
-  for (std::size_t i = 0; i < count; ++i) result.push_back(pairs[i * pairs.size() / count]);
+/// Some of `count` pairs, by chance.
+std::vector<std::size_t> drawn(std::size_t count, cv::RNG& chance) {
+  std::vector<std::size_t> result(kFewPairs);
+  for (std::size_t& index : result) {
+    index = static_cast<std::size_t>(chance.uniform(0, static_cast<int>(count)));
+  }
   return result;
 }
 
@@ -134,7 +136,7 @@ RigidPose pose_before_cameras(const cv::Matx33d& essential, std::span<const RayP
 /// another covariance.
 PoseFit before_cameras(const PoseFit& fit, std::span<const RayPair> pairs, double gate) {
   const RigidPose pose = pose_before_cameras(essential_matrix(fit.pose), pairs, gate);
-  return fit_pose(pairs, pose, FitKind::direction, gate, 0);
+  return {pose, fit.cost};
 }
 
 /// Whether two poses lie in one minimum of the cost.
@@ -143,6 +145,10 @@ bool are_alike(const RigidPose& a, const RigidPose& b) {
   constexpr double kRotation = 0.03;
   return cv::norm(a.translation.cross(b.translation)) < kTranslation &&
          cv::norm(a.rotation - b.rotation) < kRotation;
+}
+
+bool are_among(std::span<const PoseFit> fits, const RigidPose& pose) {
+  return std::ranges::any_of(fits, [&](const PoseFit& fit) { return are_alike(pose, fit.pose); });
 }
 
 /// The homography from directions of the query to those of the match, by least squares.
@@ -210,45 +216,35 @@ cv::Matx33d rotation_between(std::span<const RayPair> pairs) {
   return u * mirror * v_t;
 }
 
-double truncated_cost(const cv::Matx33d& essential, std::span<const RayPair> pairs, double gate) {
-  double cost = 0;
-  for (const RayPair& pair : pairs) {
-    cost += std::min(epipolar_error_sq(pair, essential), gate * gate);
-  }
-  return cost;
-}
-
 std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, double gate) {
   const std::vector<RayPair> inliers = fundamental_inliers(pairs, gate);
   if (inliers.size() < kMinInliers) return std::nullopt;
-  // Each start, on some of the inliers.
-  const std::vector<RayPair> few = thinned(inliers, kFewPairs);
-  const cv::Matx33d rotation = rotation_between(few);
+  const cv::Matx33d rotation = rotation_between(inliers);
+  const RayBlocks all(pairs);
+  const RayBlocks likely(inliers);
   std::vector<std::pair<double, RigidPose>> found;
+  cv::RNG chance(1);
   for (const cv::Vec3d& direction : half_sphere(kStarts)) {
-    const RigidPose pose =
-        fit_pose(few, {rotation, direction}, FitKind::direction, kWideGate, 1).pose;
-    found.emplace_back(truncated_cost(essential_matrix(pose), pairs, gate), pose);
+    const RayBlocks few(likely, drawn(likely.size(), chance));
+    const RigidPose pose = fit_direction(few, {rotation, direction}, kWideGate, kFirstSteps).pose;
+    found.emplace_back(cost_of(all, pose, gate), pose);
   }
   std::ranges::sort(found, {}, &std::pair<double, RigidPose>::first);
   // The best of those that differ, on all pairs.
-  std::vector<RigidPose> refined;
+  std::vector<PoseFit> refined;
   std::vector<PoseFit> fits;
   for (const auto& candidate : found) {
     const RigidPose& start = candidate.second;
-    if (std::ranges::any_of(refined,
-                            [&](const RigidPose& pose) { return are_alike(start, pose); })) {
-      continue;
-    }
-    refined.push_back(start);
-    fits.push_back(fit_pose(pairs, start, FitKind::direction, gate, kFitRounds));
+    if (are_among(refined, start)) continue;
+    refined.push_back({start});
+    fits.push_back(fit_direction(all, start, gate));
     if (refined.size() == kRefined) break;
   }
   std::ranges::sort(fits, {}, &PoseFit::cost);
   DirectionSearch result{before_cameras(fits.front(), pairs, gate), {}};
-  for (const PoseFit& fit : fits) {
-    if (result.rival || are_alike(fit.pose, fits.front().pose)) continue;
-    result.rival = before_cameras(fit, pairs, gate);
+  for (const PoseFit& fit : std::span(fits).subspan(1)) {
+    if (are_among(result.rivals, fit.pose)) continue;
+    result.rivals.push_back(before_cameras(fit, pairs, gate));
   }
   return result;
 }
@@ -269,7 +265,7 @@ std::optional<PoseFit> rival_of_plane(std::span<const RayPair> pairs, const Pose
     const cv::Vec3d translation(translations[i].ptr<double>());
     if (!is_seen || !(cv::norm(translation) > 0)) continue;
     const RigidPose start{cv::Matx33d(rotations[i].ptr<double>()), cv::normalize(translation)};
-    const PoseFit other = fit_pose(pairs, start, FitKind::direction, gate, kFitRounds);
+    const PoseFit other = fit_pose(pairs, start, FitKind::direction, gate);
     if (are_alike(other.pose, fit.pose)) continue;
     if (!rival || other.cost < rival->cost) rival = other;
   }

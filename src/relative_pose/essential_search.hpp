@@ -14,19 +14,16 @@ namespace loopbit {
 /// The rotation that best turns the query's rays into those of the match (Kabsch 1976).
 cv::Matx33d rotation_between(std::span<const RayPair> pairs);
 
-/// The sum of the pairs' squared epipolar errors, each at most `gate` squared, in standard
-/// deviations.
-double truncated_cost(const cv::Matx33d& essential, std::span<const RayPair> pairs, double gate);
-
 struct DirectionSearch {
   PoseFit best;
-  std::optional<PoseFit> rival;  ///< the next best that is no neighbour of it
+  std::vector<PoseFit> rivals;  ///< other minima of the cost, best first
 };
 
-/// The pose, with a translation of length 1, that explains most of the pairs. A fundamental matrix
-/// of virtual pinhole images separates most outliers (epipolar_inliers()). The cost has several
-/// minima, so that translations in all directions are starting points; the best few are refined.
-/// `gate`: in standard deviations. None with fewer than 8 inliers.
+/// The pose, with a translation of length 1, that explains the pairs best. A fundamental matrix of
+/// virtual pinhole images separates most outliers (epipolar_inliers()). The cost has many minima,
+/// so translations in all directions are starting points, each fitted to a few pairs drawn at
+/// random; the best that differ are refined on all. `gate`: in standard deviations; beyond it a
+/// pair is rather an outlier. None with fewer than 8 inliers.
 std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, double gate);
 
 /// If the pairs' points lie on a plane: the other pose that explains them, as the decomposition of

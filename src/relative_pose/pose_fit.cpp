@@ -11,11 +11,13 @@
 
 #include <opencv2/calib3d.hpp>
 
+#include "loopbit/kernels_for.hpp"
+
+#include "direction_kernels.hpp"
+
 namespace loopbit {
 namespace {
 
-constexpr double kHuber = 1.5;  // standard deviations
-constexpr int kMaxSteps = 8;
 constexpr int kSplits = 8;
 
 using Jacobian = cv::Matx<double, 2, 6>;
@@ -171,6 +173,46 @@ Residual residual_of(const RayPair& pair, const PoseFrame& pose, FitKind kind) {
   return is_epipolar(pair, kind) ? epipolar_residual(pair, pose) : point_residual(pair, pose);
 }
 
+/// What residuals are drawn from: Student's t distribution of 3 degrees of freedom, the heaviest
+/// tails that still have a variance, or outliers, spread evenly. At `gate` standard deviations both
+/// are as likely.
+class Noise {
+ public:
+  explicit Noise(double gate) : outlier_{density(gate * gate, 1), density(gate * gate, 2)} {}
+
+  /// The derivative of half the cost by half the squared residual.
+  [[nodiscard]] double weight(const Residual& residual) const {
+    const double error_sq = residual.norm_sq();
+    const double inlier = density(error_sq, residual.size);
+    return inlier / (inlier + outlier(residual.size)) * (kFreedom + residual.size) /
+           (kFreedom + error_sq);
+  }
+
+  /// Against that of a residual of 0.
+  [[nodiscard]] double likelihood(double error_sq, int size) const {
+    return (density(error_sq, size) + outlier(size)) / (1 + outlier(size));
+  }
+
+  /// Minus twice its logarithm.
+  [[nodiscard]] double cost(double error_sq, int size) const {
+    return -2 * std::log(likelihood(error_sq, size));
+  }
+
+  /// The likelihood of an outlier, against that of an inlier with a residual of 0.
+  [[nodiscard]] double outlier(int size) const { return outlier_[size == 1 ? 0 : 1]; }
+
+ private:
+  static constexpr double kFreedom = 3;
+
+  /// Against that of a residual of 0.
+  static double density(double error_sq, int size) {
+    const double share = 1 / (1 + error_sq / kFreedom);
+    return size == 1 ? share * share : share * share * std::sqrt(share);
+  }
+
+  std::array<double, 2> outlier_;
+};
+
 RigidPose moved(const RigidPose& pose, const cv::Vec6d& step, FitKind kind) {
   RigidPose result;
   result.rotation = pose.rotation * rotation_by({step[3], step[4], step[5]});
@@ -179,23 +221,21 @@ RigidPose moved(const RigidPose& pose, const cv::Vec6d& step, FitKind kind) {
   return result;
 }
 
-/// J^T W J, J^T W r and the robust cost of the pairs in use.
+/// J^T W J, J^T W r and the cost.
 struct Equations {
   cv::Matx66d squares = cv::Matx66d::zeros();
   cv::Vec6d gradient;
   double cost = 0;
 };
 
-Equations equations_of(std::span<const RayPair> pairs, const std::vector<char>& is_used,
-                       const RigidPose& pose, FitKind kind) {
+Equations equations_of(std::span<const RayPair> pairs, const RigidPose& pose, FitKind kind,
+                       const Noise& noise) {
   const PoseFrame frame(pose);
   Equations sum;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    if (is_used[i] == 0) continue;
-    const Residual residual = residual_of(pairs[i], frame, kind);
-    const double error = std::sqrt(residual.norm_sq());
-    const double weight = error <= kHuber ? 1.0 : kHuber / error;
-    sum.cost += error <= kHuber ? error * error : kHuber * (2 * error - kHuber);
+  for (const RayPair& pair : pairs) {
+    const Residual residual = residual_of(pair, frame, kind);
+    const double weight = noise.weight(residual);
+    sum.cost += noise.cost(residual.norm_sq(), residual.size);
     for (int row = 0; row < residual.size; ++row) {
       const auto jacobian = residual.jacobian.row(row);
       for (int a = 0; a < 6; ++a) {
@@ -209,6 +249,34 @@ Equations equations_of(std::span<const RayPair> pairs, const std::vector<char>& 
     for (int b = 0; b < a; ++b) sum.squares(b, a) = sum.squares(a, b);
   }
   return sum;
+}
+
+const DirectionKernels& kernels() {
+  return kernels_for<DirectionKernels>(active_instruction_set());
+}
+
+double sum_of(const float (&lanes)[kRayBlock]) {
+  double sum = 0;
+  for (const float lane : lanes) sum += static_cast<double>(lane);
+  return sum;
+}
+
+/// As the others, for rotation and direction.
+Equations equations_of(const RayBlocks& pairs, const RigidPose& pose, const Noise& noise) {
+  DirectionSums sums{};
+  std::ranges::fill(sums.likelihood, 1.0);
+  kernels().add_equations(direction_pose(pose), pairs.arrays(),
+                          static_cast<float>(noise.outlier(1)), sums);
+  Equations result;
+  std::size_t entry = 0;
+  for (int a = 0; a < 6; ++a) {
+    result.gradient[a] = sum_of(sums.gradient[a]);
+    for (int b = 0; b <= a; ++b, ++entry) {
+      result.squares(a, b) = result.squares(b, a) = sum_of(sums.squares[entry]);
+    }
+  }
+  for (const double likelihood : sums.likelihood) result.cost -= 2 * std::log(likelihood);
+  return result;
 }
 
 /// The directions that are not fitted, as a projection on those that are.
@@ -236,19 +304,49 @@ cv::Matx66d inverse_within(const cv::Matx66d& squares, const cv::Matx66d& projec
   return projection * inverse * projection;
 }
 
-/// Steps until the cost no longer falls.
-void descend(std::span<const RayPair> pairs, const std::vector<char>& is_used, FitKind kind,
-             RigidPose& pose) {
+/// The step to where the equations are 0, within what is fitted, by Cholesky's method.
+cv::Vec6d step_of(const Equations& at, double damping, const RigidPose& pose, FitKind kind) {
+  cv::Matx66d l = at.squares;
+  cv::Vec6d step = -at.gradient;
+  const double size = std::max(cv::trace(l), std::numeric_limits<double>::min());
+  const cv::Vec3d along = pose.rotation.t() * pose.translation;
+  for (int a = 0; a < 3; ++a) {
+    if (kind == FitKind::rotation) {
+      step[a] = 0;
+      for (int b = 0; b < 6; ++b) l(a, b) = l(b, a) = a == b ? size : 0;
+    } else if (kind == FitKind::direction) {
+      for (int b = 0; b < 3; ++b) l(a, b) += size * along[a] * along[b];
+    }
+  }
+  for (int a = 0; a < 6; ++a) {
+    for (int b = 0; b < a; ++b) {
+      for (int k = 0; k < b; ++k) l(a, b) -= l(a, k) * l(b, k);
+      l(a, b) /= l(b, b);
+      step[a] -= l(a, b) * step[b];
+    }
+    double rest = l(a, a) * (1 + damping);
+    for (int k = 0; k < a; ++k) rest -= l(a, k) * l(a, k);
+    l(a, a) = std::sqrt(std::max(rest, 1e-12 * size));
+    step[a] /= l(a, a);
+  }
+  for (int a = 5; a >= 0; --a) {
+    for (int b = a + 1; b < 6; ++b) step[a] -= l(b, a) * step[b];
+    step[a] /= l(a, a);
+  }
+  return step;
+}
+
+/// Levenberg and Marquardt's method; returns the cost. `equations` tells those of a pose.
+template <typename EquationsOf>
+double descend(const EquationsOf& equations, FitKind kind, int max_steps, RigidPose& pose) {
+  constexpr double kMinGain = 0.01;  // far below what chance does to a cost
   double damping = 1e-4;
-  Equations at = equations_of(pairs, is_used, pose, kind);
-  for (int step = 0; step < kMaxSteps; ++step) {
-    cv::Matx66d damped = at.squares;
-    for (int i = 0; i < 6; ++i) damped(i, i) *= 1 + damping;
-    const cv::Vec6d motion = -(inverse_within(damped, fitted_directions(pose, kind)) * at.gradient);
-    const RigidPose next = moved(pose, motion, kind);
-    const Equations there = equations_of(pairs, is_used, next, kind);
+  Equations at = equations(pose);
+  for (int step = 0; step < max_steps; ++step) {
+    const RigidPose next = moved(pose, step_of(at, damping, pose, kind), kind);
+    const Equations there = equations(next);
     if (!(there.cost < at.cost)) {
-      if (damping > 1) return;
+      if (damping > 1) break;
       damping *= 100;
       continue;
     }
@@ -256,19 +354,24 @@ void descend(std::span<const RayPair> pairs, const std::vector<char>& is_used, F
     pose = next;
     at = there;
     damping = std::max(damping / 10, 1e-7);
-    if (gain < 1e-4 * at.cost) return;
+    if (gain < kMinGain) break;
   }
+  return at.cost;
 }
 
-/// Keypoints of one object err together: its outline turns, its shadow moves. So they are drawn
-/// together.
-std::vector<std::vector<RayPair>> clusters_of(std::span<const RayPair> pairs) {
+using Cell = std::array<int, 3>;
+
+/// Keypoints of one object err together: its outline turns, its shadow moves. So those of one cell
+/// count as one.
+Cell cell_of(const RayPair& pair) {
   constexpr double kCell = 0.05;  // of a direction: about as wide as a descriptor
-  std::map<std::array<int, 3>, std::vector<RayPair>> clusters;
-  for (const RayPair& pair : pairs) {
-    const cv::Vec3d cell = pair.query.direction / kCell;
-    clusters[{cvFloor(cell[0]), cvFloor(cell[1]), cvFloor(cell[2])}].push_back(pair);
-  }
+  const cv::Vec3d cell = pair.query.direction / kCell;
+  return {cvFloor(cell[0]), cvFloor(cell[1]), cvFloor(cell[2])};
+}
+
+std::vector<std::vector<RayPair>> clusters_of(std::span<const RayPair> pairs) {
+  std::map<Cell, std::vector<RayPair>> clusters;
+  for (const RayPair& pair : pairs) clusters[cell_of(pair)].push_back(pair);
   std::vector<std::vector<RayPair>> result;
   result.reserve(clusters.size());
   for (auto& [cell, members] : clusters) result.push_back(std::move(members));
@@ -283,13 +386,10 @@ void shuffle(std::vector<std::vector<RayPair>>& clusters, cv::RNG& chance) {
 }
 
 RigidPose refitted(std::span<const std::vector<RayPair>> clusters, const RigidPose& start,
-                   FitKind kind) {
+                   FitKind kind, double gate) {
   std::vector<RayPair> pairs;
   for (const auto& cluster : clusters) pairs.insert(pairs.end(), cluster.begin(), cluster.end());
-  const std::vector<char> all(pairs.size(), 1);
-  RigidPose pose = start;
-  descend(pairs, all, kind, pose);
-  return pose;
+  return fit_pose(pairs, start, kind, gate).pose;
 }
 
 /// The motion (x, y, z, rx, ry, rz) in the frame of the query's camera that leads from `pose` to
@@ -302,7 +402,31 @@ cv::Vec6d motion_between(const RigidPose& pose, const RigidPose& other) {
   return {shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]};
 }
 
+/// The chance that noise changes which of two poses is likelier, by the costs of each pair.
+double chance_of_order(std::span<const RayPair> pairs, std::span<const double> costs,
+                       std::span<const double> rival_costs) {
+  std::map<Cell, double> differences;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    differences[cell_of(pairs[i])] += rival_costs[i] - costs[i];
+  }
+  double sum = 0;
+  double squares = 0;
+  for (const auto& [cell, difference] : differences) {
+    sum += difference;
+    squares += difference * difference;
+  }
+  return std::erfc(sum / std::sqrt(2 * squares)) / 2;
+}
+
 }  // namespace
+
+DirectionPose direction_pose(const RigidPose& pose) {
+  const PoseFrame frame(pose);
+  DirectionPose result{};
+  for (int i = 0; i < 9; ++i) result.rotation[i] = static_cast<float>(frame.rotation.val[i]);
+  for (int i = 0; i < 3; ++i) result.translation[i] = static_cast<float>(frame.translation[i]);
+  return result;
+}
 
 cv::Matx33d rotation_by(const cv::Vec3d& r) {
   const double angle_sq = r.dot(r);
@@ -315,6 +439,14 @@ cv::Matx33d rotation_by(const cv::Vec3d& r) {
 
 Residual residual_of(const RayPair& pair, const RigidPose& pose, FitKind kind) {
   return residual_of(pair, PoseFrame(pose), kind);
+}
+
+std::vector<float> errors_sq(const RayBlocks& pairs, const RigidPose& pose) {
+  const RayArrays arrays = pairs.arrays();
+  std::vector<float> result(arrays.stride);
+  kernels().errors_sq(direction_pose(pose), arrays, result.data());
+  result.resize(arrays.count);
+  return result;
 }
 
 double epipolar_error_sq(const RayPair& pair, const cv::Matx33d& essential) {
@@ -331,35 +463,47 @@ cv::Matx33d essential_matrix(const RigidPose& pose) {
   return cross_matrix(pose.translation) * pose.rotation;
 }
 
-PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind kind, double gate,
-                 int rounds) {
-  PoseFit fit{.pose = start};
-  if (kind == FitKind::rotation) fit.pose.translation = {};
-  std::vector<char> is_used(pairs.size());
-  const auto gate_pairs = [&] {
-    fit.cost = 0;
-    const PoseFrame frame(fit.pose);
-    const cv::Matx33d essential = essential_matrix(fit.pose);
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      const double error_sq = is_epipolar(pairs[i], kind)
-                                  ? epipolar_error_sq(pairs[i], essential)
-                                  : point_residual(pairs[i], frame).norm_sq();
-      is_used[i] = error_sq <= gate * gate ? 1 : 0;
-      fit.cost += std::min(error_sq, gate * gate);
-    }
-  };
-  for (int round = 0; round < rounds; ++round) {
-    gate_pairs();
-    descend(pairs, is_used, kind, fit.pose);
+double cost_of(const RayBlocks& pairs, const RigidPose& pose, double gate) {
+  const Noise noise(gate);
+  constexpr double kSmall = 1e-200;
+  double cost = 0;
+  double likelihood = 1;
+  for (const float error_sq : errors_sq(pairs, pose)) {
+    likelihood *= noise.likelihood(static_cast<double>(error_sq), 1);
+    if (likelihood > kSmall) continue;
+    cost -= 2 * std::log(likelihood);
+    likelihood = 1;
   }
-  gate_pairs();
+  return cost - 2 * std::log(likelihood);
+}
+
+PoseFit fit_direction(const RayBlocks& pairs, const RigidPose& start, double gate, int max_steps) {
+  const Noise noise(gate);
+  PoseFit fit{.pose = start};
+  const auto equations = [&](const RigidPose& pose) { return equations_of(pairs, pose, noise); };
+  fit.cost = descend(equations, FitKind::direction, max_steps, fit.pose);
   return fit;
 }
 
-cv::Matx66d covariance_of(std::span<const RayPair> inliers, const RigidPose& pose, FitKind kind) {
+PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind kind, double gate,
+                 int max_steps) {
+  if (kind == FitKind::direction) return fit_direction(RayBlocks(pairs), start, gate, max_steps);
+  const Noise noise(gate);
+  PoseFit fit{.pose = start};
+  if (kind == FitKind::rotation) fit.pose.translation = {};
+  const auto equations = [&](const RigidPose& pose) {
+    return equations_of(pairs, pose, kind, noise);
+  };
+  fit.cost = descend(equations, kind, max_steps, fit.pose);
+  return fit;
+}
+
+cv::Matx66d covariance_of(std::span<const RayPair> inliers, const RigidPose& pose, FitKind kind,
+                          double gate) {
+  const Noise noise(gate);
   const cv::Matx66d fitted = fitted_directions(pose, kind);
-  const std::vector<char> all(inliers.size(), 1);
-  const cv::Matx66d usual = inverse_within(equations_of(inliers, all, pose, kind).squares, fitted);
+  const cv::Matx66d usual =
+      inverse_within(equations_of(inliers, pose, kind, noise).squares, fitted);
   std::vector<std::vector<RayPair>> clusters = clusters_of(inliers);
   const std::size_t half = clusters.size() / 2;
   cv::RNG chance(1);
@@ -367,11 +511,41 @@ cv::Matx66d covariance_of(std::span<const RayPair> inliers, const RigidPose& pos
   for (int split = 0; split < kSplits; ++split) {
     shuffle(clusters, chance);
     for (const auto part : {std::span(clusters).first(half), std::span(clusters).subspan(half)}) {
-      const cv::Vec6d motion = motion_between(pose, refitted(part, pose, kind));
+      const cv::Vec6d motion = motion_between(pose, refitted(part, pose, kind, gate));
       spread += motion * motion.t() * (0.5 / kSplits);
     }
   }
-  return fitted * spread * fitted + usual;
+  // The mean of both, each of as many degrees of freedom as there are splits. The inverse of an
+  // estimated covariance is too large by this factor on average (Anderson, "An Introduction to
+  // Multivariate Statistical Analysis", 2003, section 7.7).
+  constexpr double kFreedom = 2 * kSplits;
+  const double inflated = kFreedom / (kFreedom - cv::trace(fitted) - 1);
+  return (fitted * spread * fitted + usual) * (inflated / 2);
+}
+
+cv::Matx66d rivalry_of(std::span<const RayPair> pairs, const RigidPose& pose,
+                       std::span<const PoseFit> rivals, double gate) {
+  const Noise noise(gate);
+  const RayBlocks blocks(pairs);
+  const auto costs_of = [&](const RigidPose& of) {
+    std::vector<double> costs;
+    for (const float error_sq : errors_sq(blocks, of)) {
+      costs.push_back(noise.cost(static_cast<double>(error_sq), 1));
+    }
+    return costs;
+  };
+  const std::vector<double> costs = costs_of(pose);
+  const cv::Matx66d fitted = fitted_directions(pose, FitKind::direction);
+  cv::Matx66d spread = cv::Matx66d::zeros();
+  double all_odds = 1;
+  for (const PoseFit& rival : rivals) {
+    const double chance = chance_of_order(pairs, costs, costs_of(rival.pose));
+    const double odds = chance / std::max(1 - chance, std::numeric_limits<double>::min());
+    const cv::Vec6d motion = fitted * motion_between(pose, rival.pose);
+    spread += motion * motion.t() * odds;
+    all_odds += odds;
+  }
+  return spread * (1 / all_odds);
 }
 
 }  // namespace loopbit

@@ -7,6 +7,7 @@
 
 #include <opencv2/core.hpp>
 
+#include "ray_blocks.hpp"
 #include "ray_pairs.hpp"
 
 namespace loopbit {
@@ -26,7 +27,7 @@ enum class FitKind {
 
 struct PoseFit {
   RigidPose pose;
-  double cost = 0;  ///< the sum of truncated squared residuals, in standard deviations
+  double cost = 0;  ///< minus twice the log likelihood of the residuals; 0 if all are 0
 };
 
 /// The rotation by the vector `r`, Rodrigues' formula.
@@ -44,25 +45,46 @@ struct Residual {
 };
 Residual residual_of(const RayPair& pair, const RigidPose& pose, FitKind kind);
 
+DirectionPose direction_pose(const RigidPose& pose);
+
 /// Only the squared residual; about twice as fast.
 double epipolar_error_sq(const RayPair& pair, const cv::Matx33d& essential);
 
+/// Those of all pairs; faster still.
+std::vector<float> errors_sq(const RayBlocks& pairs, const RigidPose& pose);
+
 cv::Matx33d essential_matrix(const RigidPose& pose);
 
-/// Enough for the inliers to settle.
-inline constexpr int kFitRounds = 3;
+/// Until the cost no longer falls.
+inline constexpr int kMaxSteps = 24;
 
-/// Refines `start` by Levenberg and Marquardt's method with Huber's loss. Pairs further than `gate`
-/// standard deviations do not count; which these are is decided anew in each of `rounds`.
+/// Refines `start` by Levenberg and Marquardt's method, to the likeliest pose if residuals are of a
+/// distribution with heavy tails, or of outliers, as likely as the others at `gate` standard
+/// deviations.
 PoseFit fit_pose(std::span<const RayPair> pairs, const RigidPose& start, FitKind kind, double gate,
-                 int rounds);
+                 int max_steps = kMaxSteps);
+
+/// The same for rotation and direction; several times as fast for pairs that are used repeatedly.
+PoseFit fit_direction(const RayBlocks& pairs, const RigidPose& start, double gate,
+                      int max_steps = kMaxSteps);
+
+/// The cost of a pose as it is, as fit_direction() has it.
+double cost_of(const RayBlocks& pairs, const RigidPose& pose, double gate);
 
 /// How far the pose may be off, in the terms of RelativePose::covariance: the spread of poses that
 /// are fitted to random halves of the inliers, beginning from `pose` (half-sampling: Efron, "The
-/// Jackknife, the Bootstrap and Other Resampling Plans", 1982, chapter 8), plus the usual
-/// covariance of least squares. Half of the pairs has twice the variance of all, so the spread of a
-/// half around the whole is the variance of the whole. Refitting follows the curved valleys of the
-/// cost, which its curvature at one point does not show. The halves are the same in each call.
-cv::Matx66d covariance_of(std::span<const RayPair> inliers, const RigidPose& pose, FitKind kind);
+/// Jackknife, the Bootstrap and Other Resampling Plans", 1982, chapter 8), and the usual covariance
+/// of least squares. Half of the pairs has twice the variance of all, so the spread of a half
+/// around the whole is the variance of the whole. Refitting follows the curved valleys of the cost,
+/// which its curvature at one point does not show. The halves are the same in each call.
+cv::Matx66d covariance_of(std::span<const RayPair> inliers, const RigidPose& pose, FitKind kind,
+                          double gate);
+
+/// What other minima of the cost add to the covariance of a direction: the motion to each, times
+/// the chance that it is the right one. That is the chance that noise changes the order of their
+/// likelihoods, by the spread of the pairs' differences (Vuong, "Likelihood ratio tests for model
+/// selection and non-nested hypotheses", 1989).
+cv::Matx66d rivalry_of(std::span<const RayPair> pairs, const RigidPose& pose,
+                       std::span<const PoseFit> rivals, double gate);
 
 }  // namespace loopbit

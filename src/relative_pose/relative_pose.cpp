@@ -193,7 +193,7 @@ class RelativePoseEstimator::Impl {
     if (static_cast<int>(inliers_.size()) < options_.min_inliers) return;
     starts_ = {fit.pose};
     direction_cost_ = fit.cost;
-    if (found->rival) starts_.push_back(found->rival->pose);
+    if (!found->rivals.empty()) starts_.push_back(found->rivals.front().pose);
     report(fit, FitKind::direction, inliers_, result);
     direction_ = fit.pose;
     result.status = PoseStatus::measured;
@@ -201,40 +201,59 @@ class RelativePoseEstimator::Impl {
     name_degenerate_case(*found, result);
   }
 
-  void name_degenerate_case(const DirectionSearch& found, RelativePose& result) {
-    const PoseFit turn =
-        fit_pose(inliers_, {rotation_between(inliers_), {}}, FitKind::rotation, gate(), kFitRounds);
-    const auto turned = inliers_of(inliers_, turn.pose, FitKind::rotation, 3.0);
+  /// Whether a turn alone explains nearly all inliers. If so, sets the rotation.
+  bool is_pure_rotation(RelativePose& result) {
     constexpr double kMinShare = 0.9;
-    if (static_cast<double>(turned.size()) > kMinShare * static_cast<double>(inliers_.size())) {
-      starts_ = {turn.pose};
-      report(turn, FitKind::rotation, turned, result);
-      result.covariance = covariance_of(turned, turn.pose, FitKind::rotation);
-      result.status = PoseStatus::pure_rotation;
-      result.known = PoseKnown::rotation;
-      return;
-    }
+    constexpr double kMaxError = 3;  // standard deviations
+    const auto share_of = [&](std::span<const RayPair> turned) {
+      return static_cast<double>(turned.size()) / static_cast<double>(inliers_.size());
+    };
+    const RigidPose start{rotation_between(inliers_), {}};
+    if (share_of(inliers_of(inliers_, start, FitKind::rotation, gate())) < 0.5) return false;
+    const PoseFit turn = fit_pose(inliers_, start, FitKind::rotation, gate());
+    const auto turned = inliers_of(inliers_, turn.pose, FitKind::rotation, kMaxError);
+    if (share_of(turned) <= kMinShare) return false;
+    starts_ = {turn.pose};
+    report(turn, FitKind::rotation, turned, result);
+    result.covariance = covariance_of(turned, turn.pose, FitKind::rotation, gate());
+    result.status = PoseStatus::pure_rotation;
+    result.known = PoseKnown::rotation;
+    return true;
+  }
+
+  void name_degenerate_case(const DirectionSearch& found, RelativePose& result) {
+    if (is_pure_rotation(result)) return;
+    // Others that explain the pairs about as well.
+    std::vector<PoseFit> rivals = found.rivals;
     const auto other = rival_of_plane(inliers_, found.best, gate());
-    const PoseFit best = fit_pose(inliers_, found.best.pose, FitKind::direction, gate(), 0);
-    if (other && other->cost < kMaxWorse * best.cost) {
+    const auto rivalry = [&](std::span<const PoseFit> of) {
+      return rivalry_of(pairs_, direction_, of, gate());
+    };
+    if (other && is_unsure(rivalry({&*other, 1}))) {
       starts_.push_back(other->pose);
       result.status = PoseStatus::plane;
       result.known = PoseKnown::nothing;
       return;
     }
-    if (found.rival && found.rival->cost < kMaxWorse * found.best.cost) {
-      result.status = PoseStatus::ambiguous;
-      result.known = PoseKnown::nothing;
-    }
+    if (other) rivals.push_back(*other);
+    rivalry_ = rivalry(rivals);
+    if (!is_unsure(rivalry_)) return;
+    result.status = PoseStatus::ambiguous;
+    result.known = PoseKnown::nothing;
+  }
+
+  /// Whether a direction with this covariance is not reported.
+  [[nodiscard]] bool is_unsure(const cv::Matx66d& covariance) const {
+    constexpr double kDegrees = 180 / std::numbers::pi;
+    return largest_sigma(covariance, 0) * kDegrees > options_.max_direction_deg;
   }
 
   /// Sets the covariance of a direction, and whether it is known at all. Not again for one that has
   /// a covariance.
   void check_parallax(RelativePose& result) const {
     if (result.covariance != cv::Matx66d::zeros()) return;
-    result.covariance = covariance_of(inliers_, direction_, FitKind::direction);
-    constexpr double kDegrees = 180 / std::numbers::pi;
-    if (largest_sigma(result.covariance, 0) * kDegrees > options_.max_direction_deg) {
+    result.covariance = covariance_of(inliers_, direction_, FitKind::direction, gate()) + rivalry_;
+    if (is_unsure(result.covariance)) {
       result.status = PoseStatus::little_parallax;
       result.known = PoseKnown::rotation;
       forget_translation(result);
@@ -276,7 +295,7 @@ class RelativePoseEstimator::Impl {
     }
     RelativePose metric = result;
     report(*fit, FitKind::metric, inliers, metric);
-    metric.covariance = covariance_of(inliers, fit->pose, FitKind::metric);
+    metric.covariance = covariance_of(inliers, fit->pose, FitKind::metric, gate());
     if (largest_sigma(metric.covariance, 0) > options_.max_position_share * distance_m(inliers)) {
       return;
     }
@@ -292,7 +311,7 @@ class RelativePoseEstimator::Impl {
   /// there is no direction to compare with.
   [[nodiscard]] bool contradicts_directions(const RigidPose& pose, RelativePose& directions) const {
     if (directions.status == PoseStatus::pure_rotation) return false;
-    const double cost = truncated_cost(essential_matrix(pose), pairs_, gate());
+    const double cost = cost_of(RayBlocks(pairs_), pose, gate());
     if (cost <= kMaxWorse * direction_cost_) return false;
     if (directions.known == PoseKnown::direction) check_parallax(directions);
     return directions.status != PoseStatus::little_parallax;
@@ -322,11 +341,11 @@ class RelativePoseEstimator::Impl {
     std::vector<PoseFit> fits;
     fits.reserve(starts.size());
     for (const RigidPose& start : starts) {
-      fits.push_back(fit_pose(with_depth, start, FitKind::metric, gate(), kFitRounds));
+      fits.push_back(fit_pose(with_depth, start, FitKind::metric, gate()));
     }
     const PoseFit& best = *std::ranges::min_element(fits, {}, &PoseFit::cost);
     has_metric_rival_ = has_rival(fits, best, distance_m(with_depth));
-    const PoseFit whole = fit_pose(pairs_, best.pose, FitKind::metric, gate(), kFitRounds);
+    const PoseFit whole = fit_pose(pairs_, best.pose, FitKind::metric, gate());
     return whole;
   }
 
@@ -349,6 +368,7 @@ class RelativePoseEstimator::Impl {
   bool has_metric_rival_ = false;
   RigidPose direction_;  ///< with a translation of length 1
   double direction_cost_ = 0;
+  cv::Matx66d rivalry_;            ///< what other directions add to its covariance
   std::vector<RigidPose> starts_;  ///< what the directions say, best first
 };
 

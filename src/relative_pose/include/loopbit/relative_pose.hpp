@@ -27,8 +27,8 @@ enum class PoseStatus {
   no_geometry,      ///< no pose explains enough of the matches
   pure_rotation,    ///< the camera only turned, as far as the images show: rotation alone is known
   little_parallax,  ///< too little parallax for a direction: rotation alone is known
-  plane,            ///< the points lie on a plane, and two poses explain them: nothing is known
-  ambiguous,        ///< two poses explain points in space about equally well: nothing is known
+  plane,            ///< the points lie on a plane, and two poses may be right: nothing is known
+  ambiguous,        ///< poses far apart may be right: nothing is known
 };
 
 inline constexpr std::array kAllPoseStatuses{PoseStatus::measured,        PoseStatus::few_matches,
@@ -140,11 +140,11 @@ struct RelativePose {
 /// Estimates relative poses. It keeps its working memory. Not thread-safe; use one per thread.
 ///
 /// Rays take the place of pixels, so that every lens works. RANSAC on all matches (see
-/// epipolar_inliers()) is followed by nonlinear least squares with a robust loss, from many
-/// starting points, each residual weighted by the noise of its two keypoints. With depths, each
-/// inlier with a depth adds a second equation, and the translation gets a length; SQPnP is a second
-/// starting point. The same input gives the same pose. Cost: 2 to 5 ms after the matches, see
-/// scripts/bench_poses.
+/// epipolar_inliers()) is followed by a search for the likeliest pose from many starting points,
+/// each residual weighted by the noise of its two keypoints. Other minima count in the covariance
+/// by the chance that they are right. With depths, each inlier with a depth adds a second equation,
+/// and the translation gets a length; SQPnP is a second starting point. The same input gives the
+/// same pose. Cost: 1 to 5 ms after the matches, see scripts/bench_poses.
 class RelativePoseEstimator {
  public:
   /// Throws Error (kind option) if `options` are not valid.
