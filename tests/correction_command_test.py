@@ -100,6 +100,14 @@ class CorrectionTest(CommandTest):
         self.assertEqual(ran.returncode, 0, ran.stderr)
         self.assertEqual([name for name in FILES if (out / name).exists()], [], "they were of another run")
 
+    def test_the_demo_has_odometry_and_a_camera_of_its_own(self):
+        ran = loopbit("demo", *STOREYS, "--correct", "--out", self.out, *NO_GATE, "--no-report", "--quiet")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        correction = json.loads((self.out / "run.json").read_text())["correction"]
+        self.assertEqual(correction["loops"], self.record["correction"]["loops"])
+        for error in ("odometry_error_m", "corrected_error_m"):
+            self.assertAlmostEqual(correction[error], self.record["correction"][error], delta=0.01)
+
     def test_poses_by_row_and_no_camera(self):
         ran = loopbit("run", self.images, "--odometry", self.dataset / "poses.txt", "--correct", "--no-poses",
                       "--out", self.out, "--no-report")

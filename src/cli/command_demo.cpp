@@ -91,7 +91,11 @@ int demo_command(DemoFlags& flags, const Arguments& arguments) {
   run.truth = {.same_place = world->same_place(), .near_place = world->near_place()};
   run.truth_description = "exact (built-in world)";
   run.positions_m = positions(*world, frames);
-  return run_session(make_world_source(world), "demo", {}, flags.session);
+  if (!run.correct) return run_session(make_world_source(world), "demo", {}, flags.session);
+  run.camera = mean_camera(*world);
+  run.camera_file = "the camera of the built-in world";
+  return run_session(make_world_source(world, drifting_odometry(*world)), "demo", {},
+                     flags.session);
 }
 
 }  // namespace
@@ -109,6 +113,9 @@ void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
                          ->type_name("DIR")
                          ->capture_default_str();
   flags->session.add_to(*command);
+  command->add_flag("--correct", flags->session.run.correct,
+                    "Give the drive odometry that drifts and a camera, correct its trajectory by a "
+                    "pose graph of odometry and loops, and withdraw the loops that it rejects");
   flags->of_detector = command->get_options(
       [&](CLI::Option* option) { return option != out && !option->check_name("--quiet"); });
   command->add_option("--frames", flags->world.frames, "Frames in the whole drive")

@@ -33,7 +33,7 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
     if (odometry) {
       pose = odometry(frame);
     } else if (frame.T_odometry_camera) {
-      pose = OdometryPose{*frame.T_odometry_camera};
+      pose = OdometryPose{*frame.T_odometry_camera, frame.odometry_covariance};
     } else {
       pose.reset();
     }

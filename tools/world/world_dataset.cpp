@@ -24,11 +24,17 @@ namespace fs = std::filesystem;
 /// The drive as a source of images.
 class WorldSource final : public ImageSource {
  public:
-  explicit WorldSource(std::shared_ptr<const World> world) : world_(std::move(world)) {}
+  WorldSource(std::shared_ptr<const World> world, std::vector<OdometryPose> odometry)
+      : world_(std::move(world)), odometry_(std::move(odometry)) {}
 
   bool next(Frame& frame) override {
     if (at_end()) return false;
     frame = {fmt::format("{:06}", frame_), World::time_s(frame_), world_->render(frame_), {}};
+    if (!odometry_.empty()) {
+      const OdometryPose& odometry = odometry_[static_cast<std::size_t>(frame_)];
+      frame.T_odometry_camera = odometry.T_odometry_camera;
+      frame.odometry_covariance = odometry.covariance;
+    }
     ++frame_;
     return true;
   }
@@ -53,6 +59,7 @@ class WorldSource final : public ImageSource {
   [[nodiscard]] bool at_end() const { return frame_ >= world_->options().frames; }
 
   std::shared_ptr<const World> world_;
+  std::vector<OdometryPose> odometry_;
   int frame_ = 0;
 };
 
@@ -98,16 +105,6 @@ std::string odometry_row(double time_s, const OdometryPose& pose) {
   return row + '\n';
 }
 
-/// That of the whole drive: the nods of single frames are left out.
-CameraModel mean_camera(const World& world) {
-  const int frames = world.options().frames;
-  CameraModel camera = world.camera(0);
-  double sum = 0;
-  for (int frame = 0; frame < frames; ++frame) sum += world.camera(frame).cy;
-  camera.cy = sum / frames;
-  return camera;
-}
-
 template <typename RowOf>
 void write_rows(const fs::path& path, int frames, const RowOf& row_of) {
   std::ofstream file(path);
@@ -118,8 +115,18 @@ void write_rows(const fs::path& path, int frames, const RowOf& row_of) {
 
 }  // namespace
 
-std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world) {
-  return std::make_unique<WorldSource>(std::move(world));
+std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world,
+                                               std::vector<OdometryPose> odometry) {
+  return std::make_unique<WorldSource>(std::move(world), std::move(odometry));
+}
+
+CameraModel mean_camera(const World& world) {
+  const int frames = world.options().frames;
+  CameraModel camera = world.camera(0);
+  double sum = 0;
+  for (int frame = 0; frame < frames; ++frame) sum += world.camera(frame).cy;
+  camera.cy = sum / frames;
+  return camera;
 }
 
 void write_dataset(const World& world, const std::string& folder,

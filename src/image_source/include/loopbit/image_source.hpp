@@ -19,6 +19,8 @@ struct Frame {
   std::string error;  ///< empty, or a sentence that says why the image is unreadable
   /// x_odometry = T_odometry_camera x_camera, in metres, by the odometry of a recording.
   std::optional<cv::Matx44d> T_odometry_camera = std::nullopt;
+  /// Of the motion since the frame before, see OdometryPose.
+  std::optional<cv::Matx66d> odometry_covariance = std::nullopt;
 };
 
 /// A sequence of images, read in order. Not thread-safe; one reader at a time.

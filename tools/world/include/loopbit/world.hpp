@@ -164,8 +164,12 @@ class World {
   std::unique_ptr<const Plan> plan_;
 };
 
-/// The drive as a sequence of images, 10 frames per second.
-std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world);
+/// The drive as a sequence of images, 10 frames per second. `odometry`: of all frames, or of none.
+std::unique_ptr<ImageSource> make_world_source(std::shared_ptr<const World> world,
+                                               std::vector<OdometryPose> odometry = {});
+
+/// The camera of the whole drive, without the nods of single frames.
+CameraModel mean_camera(const World& world);
 
 /// The drive by odometry, one pose per frame, from that of the first: per metre driven, the
 /// position drifts by 1 % and the heading by 0.1 degrees (standard deviations of errors that stay
