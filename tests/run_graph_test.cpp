@@ -160,6 +160,57 @@ TEST_F(RunGraphTest, IsReadWithItsRun) {
                      [&] { (void)read_run(path("run")); });
 }
 
+TEST_F(RunGraphTest, OdometryIsNotDoubtedWithoutReason) {
+  EXPECT_EQ(odometry_doubt(detections_, {}), "");
+  for (int frame = 11; frame < kFrames; ++frame) add_loop(frame, 20 - frame);
+  EXPECT_EQ(odometry_doubt(detections_, graph().results({})), "");
+  for (Detection& detection : detections_) detection.odometry.reset();
+  EXPECT_EQ(odometry_doubt(detections_, {}), "");
+}
+
+TEST_F(RunGraphTest, ManyRejectedLoopsAreADoubt) {
+  for (int frame = 11; frame < kFrames; ++frame) add_loop(frame, 20 - frame, 50);
+  const std::string doubt = odometry_doubt(detections_, graph().results({}));
+  EXPECT_NE(doubt.find("the pose graph rejects 10 of 10 loops"), std::string::npos) << doubt;
+  EXPECT_EQ(odometry_doubt(detections_, {}), "");
+}
+
+TEST_F(RunGraphTest, AJumpIsADoubtUnlessALoopJoinsItsSides) {
+  for (int frame = 12; frame < kFrames; ++frame) {
+    detections_[static_cast<std::size_t>(frame)].odometry->T_odometry_camera(1, 3) = -30;
+  }
+  const std::string doubt = odometry_doubt(detections_, {});
+  EXPECT_NE(doubt.find("it jumps by 30.0 m from frame 11 to frame 12"), std::string::npos) << doubt;
+  add_loop(18, 13);
+  EXPECT_NE(odometry_doubt(detections_, {}), "") << "both after it";
+  add_loop(19, 1);
+  EXPECT_EQ(odometry_doubt(detections_, {}), "");
+}
+
+TEST_F(RunGraphTest, OdometryThatStopsIsADoubt) {
+  for (int frame = 12; frame < kFrames; ++frame) {
+    detections_[static_cast<std::size_t>(frame)].odometry = detections_[11].odometry;
+  }
+  EXPECT_EQ(odometry_doubt(detections_, {}), "") << "for a moment";
+  for (int frame = 10; frame < kFrames; ++frame) {
+    detections_[static_cast<std::size_t>(frame)].odometry = detections_[10].odometry;
+  }
+  const std::string doubt = odometry_doubt(detections_, {});
+  EXPECT_NE(doubt.find("it stands still from frame 10 to the end"), std::string::npos) << doubt;
+}
+
+TEST_F(RunGraphTest, PlacesOutOfReachAreADoubtIfMoreThanLoops) {
+  for (int frame = 11; frame < kFrames; ++frame) {
+    detections_[static_cast<std::size_t>(frame)].status = Status::unreachable;
+  }
+  EXPECT_NE(odometry_doubt(detections_, {}).find("10 frames show a place that is out of reach"),
+            std::string::npos);
+  for (int frame = 0; frame < 10; ++frame) {
+    detections_[static_cast<std::size_t>(frame)].status = Status::loop;
+  }
+  EXPECT_EQ(odometry_doubt(detections_, {}), "");
+}
+
 TEST_F(RunGraphTest, WithoutOdometryThereIsNothingToCorrect) {
   for (Detection& detection : detections_) detection.odometry.reset();
   test::expect_error(ErrorKind::input, {"No frame has odometry"}, [&] { (void)graph(); });

@@ -137,7 +137,7 @@ void print_summary(const RunOutcome& run, const std::string& report) {
   const auto& correction = record.correction;
   print_changes(detections, correction ? static_cast<std::size_t>(correction->rejected()) : 0);
   print_reasons(detections);
-  if (const std::string doubt = odometry_doubt(detections); !doubt.empty()) {
+  if (const std::string doubt = odometry_doubt(detections, correction); !doubt.empty()) {
     fmt::print("odometry   {}\n", doubt);
   }
   if (correction) print_correction(*correction, run.folder);

@@ -242,7 +242,7 @@ void RunFolder::write_record(const RunRecord& record) {
   whole.machine = this_machine();
   if (record.stopped_by != kRunning) {
     whole.results = run_results(detections_, record.wall_s);
-    whole.odometry_doubt = odometry_doubt(detections_);
+    whole.odometry_doubt = odometry_doubt(detections_, record.correction);
   }
   std::string text = to_json(whole) + '\n';
   if (record.stopped_by == kRunning) text.append(kRoomForTheEnd - 1, ' ').push_back('\n');

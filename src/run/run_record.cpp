@@ -131,18 +131,6 @@ int Correction::rejected() const {
   return std::accumulate(by_verdict.begin(), by_verdict.end(), -kept());
 }
 
-std::string odometry_doubt(const std::vector<Detection>& detections) {
-  constexpr std::ptrdiff_t kLeast = 10;
-  const auto against = std::ranges::count(detections, Status::unreachable, &Detection::status);
-  const auto in_favour = std::ranges::count(detections, Status::loop, &Detection::status);
-  if (against < kLeast || against <= in_favour) return "";
-  return fmt::format(
-      "Odometry may be wrong: {} frames show a place that is out of reach by odometry, and only {} "
-      "one in reach. If places do not look alike here, check its scale, axes and times, and look "
-      "for jumps; compare with a run without it.",
-      against, in_favour);
-}
-
 double total_ms(const StepTimes& times) {
   return times.content_ms + times.retrieval_ms + times.features_ms + times.verification_ms;
 }

@@ -79,7 +79,7 @@ struct RunRecord {
   std::string early_end = {};  ///< of the input, see ImageSource
   std::string camera = {};     ///< calibration that measured relative poses; empty = none
   std::string odometry = {};   ///< its file; empty = none
-  /// A sentence, if most loops contradict the odometry; see odometry_doubt().
+  /// A sentence, if there is reason to doubt the odometry; see odometry_doubt().
   std::string odometry_doubt = {};
   std::optional<Correction> correction = std::nullopt;
   std::string truth = {};                          ///< description of the truth, for people
@@ -94,8 +94,10 @@ struct RunRecord {
 };
 
 /// Why the odometry may be wrong: a sentence if more frames show a place that is out of reach by
-/// odometry than one that is in reach. Empty otherwise.
-std::string odometry_doubt(const std::vector<Detection>& detections);
+/// odometry than one that is in reach, if the pose graph rejects more than a tenth of the loops, or
+/// if the odometry jumps, with no loop across, or stands still to the end. Empty otherwise.
+std::string odometry_doubt(const std::vector<Detection>& detections,
+                           const std::optional<Correction>& correction);
 
 /// Total time of all steps.
 double total_ms(const StepTimes& times);
