@@ -150,7 +150,7 @@ Outcome judge_injected(int seeds) {
 /// Seconds of processor time of solve(), which has one thread: others may use the machine.
 double time_batch() {
   const SyntheticGraph drive =
-      make_synthetic_graph({.keyframes = 10'000, .loops = 4500, .wrong_share = 0.1, .blocks = 14});
+      make_synthetic_graph({.keyframes = 10'000, .loops = 4500, .wrong_share = 0.1, .blocks = 13});
   LoopGraph graph = graph_of(drive);
   const std::clock_t begin = std::clock();
   graph.solve();

@@ -427,6 +427,26 @@ TEST(LoopGraphTest, EvidenceNamesTheReason) {
   }
 }
 
+/// Odometry drifts by more than four standard deviations; most loops are just within the limit.
+TEST(LoopGraphTest, AMetricLoopBeyondDriftIsKeptWhereOthersPutItToo) {
+  LoopGraph graph;
+  graph.add_keyframe();
+  for (int k = 0; k < 100; ++k) graph.add_keyframe({pose_at(0, 1, 0), diagonal(0.02, 0.002)});
+  const auto add = [&](int query, double error_m) {
+    const cv::Matx44d pose = pose_at(0, 90 + error_m, 0);
+    return graph.add_loop({query - 90, query, PoseKnown::metric, pose, diagonal(0.05, 0.005)});
+  };
+  for (int query = 90; query < 97; ++query) add(query, 0.85);
+  const auto beyond = static_cast<std::size_t>(add(97, 1));
+  const auto wrong = static_cast<std::size_t>(add(98, 3));
+  EXPECT_GT(*graph.loops()[beyond].odometry_chi2, graph.loops()[beyond].limit);
+  graph.solve();
+  for (std::size_t i = 0; i <= beyond; ++i) {
+    EXPECT_EQ(graph.loops()[i].verdict, LoopVerdict::kept) << i;
+  }
+  EXPECT_EQ(graph.loops()[wrong].verdict, LoopVerdict::unreachable);
+}
+
 TEST(LoopGraphTest, SessionsAreJoinedByLoops) {
   // The second session drives the same curve, from elsewhere.
   LoopGraph graph;

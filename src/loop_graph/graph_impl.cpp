@@ -117,7 +117,7 @@ void GraphImpl::solve() {
   start_from_relaxation();
   reject_improbable();
   solve_kept();
-  // Of loops that only others contradicted, those that fit.
+  // Of loops that only others or odometry contradicted, those that fit.
   keep_what_fits();
   measure_chi2();
   judged_ = loops_.size();
@@ -244,11 +244,17 @@ void GraphImpl::solve_kept() {
   }
 }
 
+/// Odometry may have drifted further than it hardly ever does. That other loops moved the poses to
+/// where such a loop puts them is no accident if it is metric; anything less fits a place nearby.
 void GraphImpl::keep_what_fits() {
   bool any = false;
-  for (const std::size_t i : of_verdict(LoopVerdict::inconsistent)) {
-    if (chi2(i) > loops_[i].limit) continue;
-    loops_[i].verdict = LoopVerdict::kept;
+  for (std::size_t i = 0; i < loops_.size(); ++i) {
+    JudgedLoop& loop = loops_[i];
+    const bool may_fit =
+        loop.verdict == LoopVerdict::inconsistent ||
+        (loop.verdict == LoopVerdict::unreachable && loop.edge.known == PoseKnown::metric);
+    if (!may_fit || chi2(i) > loop.limit) continue;
+    loop.verdict = LoopVerdict::kept;
     any = true;
   }
   if (any) solve_whole();
