@@ -5,6 +5,8 @@
 
 import csv
 import json
+import pathlib
+import subprocess
 import unittest
 
 from loopbit_command import QUICK, CommandTest, loopbit
@@ -14,6 +16,7 @@ STOREYS = ["--frames", 80 if QUICK else 240, "--world", f"spacing_m={4.5 if QUIC
            "floors=2", "--world", "laps=1.3", "--world", "width_px=320", "--world", "height_px=240"]
 # The detector then takes odometry for no reason against a place.
 NO_GATE = ["--set", "decision.reach_m=1000", "--set", "decision.reach_up_m=1000"]
+MAKE_ODOMETRY = pathlib.Path(__file__).parent.parent / "scripts/make_odometry"
 FILES = ["corrected.kitti", "corrected.tum", "graph.g2o", "judged_loops.csv", "trajectory.csv"]
 
 
@@ -117,6 +120,31 @@ class CorrectionTest(CommandTest):
                  (self.out / "corrected.tum").read_text().splitlines()[1:]]
         self.assertEqual(times, list(range(len(times))), "frames take the place of times")
         self.assertEqual({loop["known"] for loop in table(self.out / "judged_loops.csv")}, {"nothing"})
+
+    @unittest.skipIf(QUICK, "what is found in wider steps is not judged")
+    def test_wrong_odometry_loses_no_loops_silently(self):
+        truth = ["--truth", self.dataset / "truth.csv", "--not-false", self.dataset / "not_false.csv"]
+        flags = [self.dataset, *truth, "--no-report", "--quiet", "--overwrite", "--out", self.out]
+
+        def record_of(*more):
+            ran = loopbit("run", *flags, *more)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            return json.loads((self.out / "run.json").read_text())
+
+        without = record_of()["score"]["late"]["right"]
+        told = []
+        for fault in (None, "jump", "scale", "axes", "clock"):
+            spoil = ["--fault", fault] if fault else []
+            made = subprocess.run([MAKE_ODOMETRY, self.dataset / "poses.txt", *spoil], check=True,
+                                  stdout=subprocess.PIPE, text=True)
+            odometry = self.scratch / "odometry.txt"
+            odometry.write_text(made.stdout)
+            record = record_of("--odometry", odometry, "--correct")
+            if "odometry_doubt" in record:
+                told.append(fault)
+            else:
+                self.assertGreater(record["score"]["late"]["right"], 0.85 * without, fault)
+        self.assertEqual([fault for fault in told if fault in (None, "jump", "clock")], ["jump", "clock"])
 
     def test_without_odometry_it_is_refused(self):
         self.assert_fails(loopbit("run", self.storeys, "--correct", "--out", self.out), 2, "--correct",
