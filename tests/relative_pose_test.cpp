@@ -14,6 +14,7 @@
 #include <opencv2/core.hpp>
 
 #include "loopbit/kernels_for.hpp"
+#include "loopbit/ray_geometry.hpp"
 
 #include "direction_kernels.hpp"
 #include "pose_fit.hpp"
@@ -372,7 +373,6 @@ std::vector<RayPair> some_pairs(const Scene& scene, int count) {
 
 constexpr float kOutlier = 0.03F;
 
-/// Lanes added up.
 struct PlainSums {
   cv::Matx66d squares = cv::Matx66d::zeros();
   cv::Vec6d gradient;
@@ -381,21 +381,17 @@ struct PlainSums {
 
 PlainSums sums_by_kernel(InstructionSet set, const DirectionPose& pose,
                          const std::vector<RayPair>& pairs) {
-  DirectionSums lanes{};
-  std::ranges::fill(lanes.likelihood, 1.0);
-  kernels_for<DirectionKernels>(set).add_equations(pose, RayBlocks(pairs).arrays(), kOutlier,
-                                                   lanes);
+  DirectionSums found;
+  kernels_for<DirectionKernels>(set).sum_up(pose, RayBlocks(pairs).arrays(), kOutlier, found);
   PlainSums sums;
-  for (std::size_t lane = 0; lane < kRayBlock; ++lane) {
-    std::size_t entry = 0;
-    for (int a = 0; a < 6; ++a) {
-      sums.gradient[a] += static_cast<double>(lanes.gradient[a][lane]);
-      for (int b = 0; b <= a; ++b, ++entry) {
-        sums.squares(a, b) += static_cast<double>(lanes.squares[entry][lane]);
-      }
+  std::size_t entry = 0;
+  for (int a = 0; a < 6; ++a) {
+    sums.gradient[a] = static_cast<double>(found.gradient[a]);
+    for (int b = 0; b <= a; ++b, ++entry) {
+      sums.squares(a, b) = static_cast<double>(found.squares[entry]);
     }
-    sums.likelihood *= lanes.likelihood[lane];
   }
+  for (const double likelihood : found.likelihoods) sums.likelihood *= likelihood;
   return sums;
 }
 

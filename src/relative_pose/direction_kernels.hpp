@@ -30,12 +30,12 @@ struct DirectionPose {
   float translation[3];  ///< in the frame of the query's camera
 };
 
-/// Sums over the lanes of blocks. `squares` has the lower triangle of J^T W J, row by row.
+/// Sums over all pairs.
 struct DirectionSums {
   static constexpr std::size_t kSquares = 21;
-  float squares[kSquares][kRayBlock];
-  float gradient[6][kRayBlock];
-  double likelihood[kRayBlock];  ///< the product
+  float squares[kSquares];  ///< the lower triangle of J^T W J, row by row
+  float gradient[6];
+  double likelihoods[kRayBlock];  ///< the product of every 16th pair, each against that of 0
 };
 
 /// The inner loops of a fit of rotation and direction, for one instruction set.
@@ -43,9 +43,9 @@ struct DirectionKernels {
   template <InstructionSet>
   static const DirectionKernels& compiled_for();
 
-  /// Adds all pairs to `sums`. `outlier`: see Noise.
-  void (*add_equations)(const DirectionPose& pose, const RayArrays& pairs, float outlier,
-                        DirectionSums& sums);
+  /// `outlier`: the likelihood of an outlier, against that of an inlier with a residual of 0.
+  void (*sum_up)(const DirectionPose& pose, const RayArrays& pairs, float outlier,
+                 DirectionSums& sums);
   /// The squared residual of each pair, in standard deviations; whole blocks are written.
   void (*errors_sq)(const DirectionPose& pose, const RayArrays& pairs, float* errors_sq);
 };

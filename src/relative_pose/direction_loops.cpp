@@ -114,7 +114,13 @@ void differentiate(const DirectionPose& pose, const RayArrays& block, float outl
   }
 }
 
-void add(const BlockTerms& __restrict terms, float outlier, DirectionSums& __restrict sums) {
+/// Sums of every 16th pair.
+struct LaneSums {
+  float squares[DirectionSums::kSquares][kRayBlock];
+  float gradient[6][kRayBlock];
+};
+
+void add(const BlockTerms& __restrict terms, LaneSums& __restrict sums) {
   std::size_t entry = 0;
   for (std::size_t a = 0; a < 6; ++a) {
     for (std::size_t b = 0; b <= a; ++b, ++entry) {
@@ -126,38 +132,54 @@ void add(const BlockTerms& __restrict terms, float outlier, DirectionSums& __res
       sums.gradient[a][i] += terms.weighted[a][i] * terms.residual[i];
     }
   }
+}
+
+float sum_of(const float (&lanes)[kRayBlock]) {
+  float eight[8];
+  for (std::size_t i = 0; i < 8; ++i) eight[i] = lanes[i] + lanes[i + 8];
+  float four[4];
+  for (std::size_t i = 0; i < 4; ++i) four[i] = eight[i] + eight[i + 4];
+  return (four[0] + four[2]) + (four[1] + four[3]);
+}
+
+void sum_up(const DirectionPose& pose, const RayArrays& pairs, float outlier, DirectionSums& sums) {
+  LaneSums lanes = {};
   const double most = 1.0 / (1.0 + static_cast<double>(outlier));
-  for (std::size_t i = 0; i < kRayBlock; ++i) {
-    sums.likelihood[i] *= static_cast<double>(terms.likelihood[i]) * most;
-  }
-}
-
-void add_equations(const DirectionPose& pose, const RayArrays& pairs, float outlier,
-                   DirectionSums& sums) {
+  for (double& likelihood : sums.likelihoods) likelihood = 1;
   for (std::size_t i = 0; i < pairs.count; i += kRayBlock) {
-    const RayArrays block = {pairs.numbers + i, pairs.stride, kRayBlock};
     BlockTerms terms;
-    differentiate(pose, block, outlier, static_cast<std::int32_t>(pairs.count - i), terms);
-    add(terms, outlier, sums);
+    differentiate(pose, {pairs.numbers + i, pairs.stride, kRayBlock}, outlier,
+                  static_cast<std::int32_t>(pairs.count - i), terms);
+    add(terms, lanes);
+    for (std::size_t lane = 0; lane < kRayBlock; ++lane) {
+      sums.likelihoods[lane] *= static_cast<double>(terms.likelihood[lane]) * most;
+    }
   }
+  for (std::size_t i = 0; i < DirectionSums::kSquares; ++i) {
+    sums.squares[i] = sum_of(lanes.squares[i]);
+  }
+  for (std::size_t i = 0; i < 6; ++i) sums.gradient[i] = sum_of(lanes.gradient[i]);
 }
 
-void measure_block(const DirectionPose& __restrict pose, const float* __restrict query,
-                   const float* __restrict match, std::size_t stride, float* __restrict errors_sq) {
-  for (std::size_t i = 0; i < kRayBlock; ++i) {
-    const LaneError error = lane_error(pose, LaneRay(query, stride, i), LaneRay(match, stride, i));
-    errors_sq[i] = error.value * error.value;
+void measure_block(const DirectionPose& pose, const RayArrays& block, float* errors_sq) {
+  const float* __restrict query = block.numbers;
+  const float* __restrict match = query + RayArrays::kNumbers / 2 * block.stride;
+  float values[kRayBlock];
+  for (std::int32_t lane = 0; lane < static_cast<std::int32_t>(kRayBlock); ++lane) {
+    const auto i = static_cast<std::size_t>(lane);
+    values[i] =
+        lane_error(pose, LaneRay(query, block.stride, i), LaneRay(match, block.stride, i)).value;
   }
+  for (std::size_t i = 0; i < kRayBlock; ++i) errors_sq[i] = values[i] * values[i];
 }
 
 void measure(const DirectionPose& pose, const RayArrays& pairs, float* errors_sq) {
-  const float* match = pairs.numbers + RayArrays::kNumbers / 2 * pairs.stride;
   for (std::size_t i = 0; i < pairs.count; i += kRayBlock) {
-    measure_block(pose, pairs.numbers + i, match + i, pairs.stride, errors_sq + i);
+    measure_block(pose, {pairs.numbers + i, pairs.stride, kRayBlock}, errors_sq + i);
   }
 }
 
-constexpr DirectionKernels kDirectionKernels{add_equations, measure};
+constexpr DirectionKernels kDirectionKernels{sum_up, measure};
 
 }  // namespace
 

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include <opencv2/calib3d.hpp>
 
+#include "loopbit/ray_geometry.hpp"
 #include "loopbit/verification.hpp"
 
 namespace loopbit {
@@ -71,20 +73,6 @@ std::vector<RayPair> fundamental_inliers(std::span<const RayPair> pairs, double 
   return inliers;
 }
 
-/// Directions all over a half of the sphere: a translation and its opposite have the same essential
-/// matrix. A spiral of equal areas.
-std::vector<cv::Vec3d> half_sphere(int count) {
-  constexpr double kGoldenAngle = 2.399963229728653;
-  std::vector<cv::Vec3d> directions;
-  for (int i = 0; i < count; ++i) {
-    const double z = (i + 0.5) / count;
-    const double radius = std::sqrt(1 - z * z);
-    directions.emplace_back(radius * std::cos(i * kGoldenAngle),
-                            radius * std::sin(i * kGoldenAngle), z);
-  }
-  return directions;
-}
-
 /// Some of `count` pairs, by chance.
 std::vector<std::size_t> drawn(std::size_t count, cv::RNG& chance) {
   std::vector<std::size_t> result(kFewPairs);
@@ -94,12 +82,10 @@ std::vector<std::size_t> drawn(std::size_t count, cv::RNG& chance) {
   return result;
 }
 
-/// Pairs that `pose` explains and whose point is before both cameras.
-int points_before(const RigidPose& pose, const cv::Matx33d& essential,
-                  std::span<const RayPair> pairs, double gate) {
+/// Pairs whose point is before both cameras.
+int points_before(const RigidPose& pose, std::span<const RayPair> pairs) {
   int count = 0;
   for (const RayPair& pair : pairs) {
-    if (epipolar_error_sq(pair, essential) > gate * gate) continue;
     const cv::Vec3d u = pose.rotation * pair.query.direction;
     const cv::Vec3d& m = pair.match.direction;
     const cv::Vec3d normal = m.cross(u);
@@ -110,33 +96,30 @@ int points_before(const RigidPose& pose, const cv::Matx33d& essential,
   return count;
 }
 
-/// The one of the four poses of an essential matrix that puts most of the pairs' points before both
-/// cameras.
-RigidPose pose_before_cameras(const cv::Matx33d& essential, std::span<const RayPair> pairs,
-                              double gate) {
+/// The fit, of the one of the four poses of its essential matrix that puts most of the points
+/// before both cameras.
+PoseFit before_cameras(const PoseFit& fit, std::span<const RayPair> pairs, double gate) {
+  const cv::Matx33d essential = essential_matrix(fit.pose);
+  std::vector<RayPair> inliers;
+  std::ranges::copy_if(pairs, std::back_inserter(inliers), [&](const RayPair& pair) {
+    return epipolar_error_sq(pair, essential) <= gate * gate;
+  });
   cv::Matx33d first;
   cv::Matx33d second;
   cv::Vec3d translation;
   cv::decomposeEssentialMat(essential, first, second, translation);
-  RigidPose best;
+  PoseFit best = fit;
   int most = -1;
   for (const cv::Matx33d& rotation : {first, second}) {
     for (const double sign : {1.0, -1.0}) {
       const RigidPose pose{rotation, translation * sign};
-      const int count = points_before(pose, essential, pairs, gate);
+      const int count = points_before(pose, inliers);
       if (count <= most) continue;
       most = count;
-      best = pose;
+      best.pose = pose;
     }
   }
   return best;
-}
-
-/// The fit, of the pose whose points are before the cameras. The other sign of a translation has
-/// another covariance.
-PoseFit before_cameras(const PoseFit& fit, std::span<const RayPair> pairs, double gate) {
-  const RigidPose pose = pose_before_cameras(essential_matrix(fit.pose), pairs, gate);
-  return {pose, fit.cost};
 }
 
 /// Whether two poses lie in one minimum of the cost.
@@ -208,12 +191,7 @@ std::optional<cv::Matx33d> homography_of_plane(std::span<const RayPair> pairs, d
 cv::Matx33d rotation_between(std::span<const RayPair> pairs) {
   cv::Matx33d sum = cv::Matx33d::zeros();
   for (const RayPair& pair : pairs) sum += pair.match.direction * pair.query.direction.t();
-  cv::Matx31d values;
-  cv::Matx33d u;
-  cv::Matx33d v_t;
-  cv::SVD::compute(sum, values, u, v_t);
-  const cv::Matx33d mirror(1, 0, 0, 0, 1, 0, 0, 0, cv::determinant(u * v_t));
-  return u * mirror * v_t;
+  return best_rotation(sum);
 }
 
 std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, double gate) {

@@ -12,6 +12,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "loopbit/kernels_for.hpp"
+#include "loopbit/ray_geometry.hpp"
 
 #include "direction_kernels.hpp"
 
@@ -28,10 +29,6 @@ cv::Matx23d across(const cv::Vec3d& direction) {
   const cv::Vec3d u = cv::normalize(direction.cross(axis));
   const cv::Vec3d v = direction.cross(u);
   return {u[0], u[1], u[2], v[0], v[1], v[2]};
-}
-
-cv::Matx33d cross_matrix(const cv::Vec3d& v) {
-  return {0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0};
 }
 
 /// A pose, and its inverse rotation and translation: what residuals need of it.
@@ -255,27 +252,34 @@ const DirectionKernels& kernels() {
   return kernels_for<DirectionKernels>(active_instruction_set());
 }
 
-double sum_of(const float (&lanes)[kRayBlock]) {
-  double sum = 0;
-  for (const float lane : lanes) sum += static_cast<double>(lane);
-  return sum;
+/// Minus twice the logarithm of a product of likelihoods, which may be too small for a number.
+double cost_of_all(std::span<const double> likelihoods) {
+  constexpr double kSmall = 1e-100;
+  double cost = 0;
+  double product = 1;
+  for (const double likelihood : likelihoods) {
+    product *= likelihood;
+    if (product > kSmall) continue;
+    cost -= 2 * std::log(product);
+    product = 1;
+  }
+  return cost - 2 * std::log(product);
 }
 
 /// As the others, for rotation and direction.
 Equations equations_of(const RayBlocks& pairs, const RigidPose& pose, const Noise& noise) {
-  DirectionSums sums{};
-  std::ranges::fill(sums.likelihood, 1.0);
-  kernels().add_equations(direction_pose(pose), pairs.arrays(),
-                          static_cast<float>(noise.outlier(1)), sums);
+  DirectionSums sums;
+  kernels().sum_up(direction_pose(pose), pairs.arrays(), static_cast<float>(noise.outlier(1)),
+                   sums);
   Equations result;
   std::size_t entry = 0;
   for (int a = 0; a < 6; ++a) {
-    result.gradient[a] = sum_of(sums.gradient[a]);
+    result.gradient[a] = static_cast<double>(sums.gradient[a]);
     for (int b = 0; b <= a; ++b, ++entry) {
-      result.squares(a, b) = result.squares(b, a) = sum_of(sums.squares[entry]);
+      result.squares(a, b) = result.squares(b, a) = static_cast<double>(sums.squares[entry]);
     }
   }
-  for (const double likelihood : sums.likelihood) result.cost -= 2 * std::log(likelihood);
+  result.cost = cost_of_all(sums.likelihoods);
   return result;
 }
 
@@ -318,20 +322,21 @@ cv::Vec6d step_of(const Equations& at, double damping, const RigidPose& pose, Fi
       for (int b = 0; b < 3; ++b) l(a, b) += size * along[a] * along[b];
     }
   }
+  cv::Vec6d inverse;  // of the diagonal
   for (int a = 0; a < 6; ++a) {
     for (int b = 0; b < a; ++b) {
       for (int k = 0; k < b; ++k) l(a, b) -= l(a, k) * l(b, k);
-      l(a, b) /= l(b, b);
+      l(a, b) *= inverse[b];
       step[a] -= l(a, b) * step[b];
     }
     double rest = l(a, a) * (1 + damping);
     for (int k = 0; k < a; ++k) rest -= l(a, k) * l(a, k);
-    l(a, a) = std::sqrt(std::max(rest, 1e-12 * size));
-    step[a] /= l(a, a);
+    inverse[a] = 1 / std::sqrt(std::max(rest, 1e-12 * size));
+    step[a] *= inverse[a];
   }
   for (int a = 5; a >= 0; --a) {
     for (int b = a + 1; b < 6; ++b) step[a] -= l(b, a) * step[b];
-    step[a] /= l(a, a);
+    step[a] *= inverse[a];
   }
   return step;
 }
@@ -402,20 +407,27 @@ cv::Vec6d motion_between(const RigidPose& pose, const RigidPose& other) {
   return {shift[0], shift[1], shift[2], turn[0], turn[1], turn[2]};
 }
 
-/// The chance that noise changes which of two poses is likelier, by the costs of each pair.
-double chance_of_order(std::span<const RayPair> pairs, std::span<const double> costs,
-                       std::span<const double> rival_costs) {
-  std::map<Cell, double> differences;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    differences[cell_of(pairs[i])] += rival_costs[i] - costs[i];
-  }
+/// The chance that noise changes which of two poses is likelier, by how much more one costs in each
+/// cluster.
+double chance_of_order(std::span<const double> differences) {
   double sum = 0;
   double squares = 0;
-  for (const auto& [cell, difference] : differences) {
+  for (const double difference : differences) {
     sum += difference;
     squares += difference * difference;
   }
   return std::erfc(sum / std::sqrt(2 * squares)) / 2;
+}
+
+/// The number of each pair's cluster.
+std::vector<std::size_t> cluster_numbers(std::span<const RayPair> pairs) {
+  std::map<Cell, std::size_t> numbers;
+  std::vector<std::size_t> result;
+  result.reserve(pairs.size());
+  for (const RayPair& pair : pairs) {
+    result.push_back(numbers.try_emplace(cell_of(pair), numbers.size()).first->second);
+  }
+  return result;
 }
 
 }  // namespace
@@ -426,15 +438,6 @@ DirectionPose direction_pose(const RigidPose& pose) {
   for (int i = 0; i < 9; ++i) result.rotation[i] = static_cast<float>(frame.rotation.val[i]);
   for (int i = 0; i < 3; ++i) result.translation[i] = static_cast<float>(frame.translation[i]);
   return result;
-}
-
-cv::Matx33d rotation_by(const cv::Vec3d& r) {
-  const double angle_sq = r.dot(r);
-  const cv::Matx33d k = cross_matrix(r);
-  if (angle_sq < 1e-16) return cv::Matx33d::eye() + k;
-  const double angle = std::sqrt(angle_sq);
-  return cv::Matx33d::eye() + k * (std::sin(angle) / angle) +
-         k * k * ((1 - std::cos(angle)) / angle_sq);
 }
 
 Residual residual_of(const RayPair& pair, const RigidPose& pose, FitKind kind) {
@@ -465,16 +468,12 @@ cv::Matx33d essential_matrix(const RigidPose& pose) {
 
 double cost_of(const RayBlocks& pairs, const RigidPose& pose, double gate) {
   const Noise noise(gate);
-  constexpr double kSmall = 1e-200;
-  double cost = 0;
-  double likelihood = 1;
+  std::vector<double> likelihoods;
+  likelihoods.reserve(pairs.size());
   for (const float error_sq : errors_sq(pairs, pose)) {
-    likelihood *= noise.likelihood(static_cast<double>(error_sq), 1);
-    if (likelihood > kSmall) continue;
-    cost -= 2 * std::log(likelihood);
-    likelihood = 1;
+    likelihoods.push_back(noise.likelihood(static_cast<double>(error_sq), 1));
   }
-  return cost - 2 * std::log(likelihood);
+  return cost_of_all(likelihoods);
 }
 
 PoseFit fit_direction(const RayBlocks& pairs, const RigidPose& start, double gate, int max_steps) {
@@ -527,19 +526,23 @@ cv::Matx66d rivalry_of(std::span<const RayPair> pairs, const RigidPose& pose,
                        std::span<const PoseFit> rivals, double gate) {
   const Noise noise(gate);
   const RayBlocks blocks(pairs);
-  const auto costs_of = [&](const RigidPose& of) {
-    std::vector<double> costs;
-    for (const float error_sq : errors_sq(blocks, of)) {
-      costs.push_back(noise.cost(static_cast<double>(error_sq), 1));
+  const std::vector<std::size_t> clusters = cluster_numbers(pairs);
+  const std::vector<float> errors = errors_sq(blocks, pose);
+  const auto differences = [&](const RigidPose& rival) {
+    std::vector<double> result(pairs.size());
+    const std::vector<float> rival_errors = errors_sq(blocks, rival);
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const double likelihood = noise.likelihood(static_cast<double>(errors[i]), 1);
+      const double of_rival = noise.likelihood(static_cast<double>(rival_errors[i]), 1);
+      result[clusters[i]] += std::log(likelihood / of_rival);
     }
-    return costs;
+    return result;
   };
-  const std::vector<double> costs = costs_of(pose);
   const cv::Matx66d fitted = fitted_directions(pose, FitKind::direction);
   cv::Matx66d spread = cv::Matx66d::zeros();
   double all_odds = 1;
   for (const PoseFit& rival : rivals) {
-    const double chance = chance_of_order(pairs, costs, costs_of(rival.pose));
+    const double chance = chance_of_order(differences(rival.pose));
     const double odds = chance / std::max(1 - chance, std::numeric_limits<double>::min());
     const cv::Vec6d motion = fitted * motion_between(pose, rival.pose);
     spread += motion * motion.t() * odds;

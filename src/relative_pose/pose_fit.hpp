@@ -30,9 +30,6 @@ struct PoseFit {
   double cost = 0;  ///< minus twice the log likelihood of the residuals; 0 if all are 0
 };
 
-/// The rotation by the vector `r`, Rodrigues' formula.
-cv::Matx33d rotation_by(const cv::Vec3d& r);
-
 /// The squared residual of a pair, in standard deviations, and the number of its equations: one
 /// (the epipolar constraint; Sampson's distance) or, if its depth is known or `kind` is rotation,
 /// two.

@@ -13,6 +13,7 @@
 #include <opencv2/core/quaternion.hpp>
 
 #include "loopbit/error.hpp"
+#include "loopbit/ray_geometry.hpp"
 
 #include "essential_search.hpp"
 #include "point_depths.hpp"

@@ -9,6 +9,8 @@
 #include <limits>
 #include <vector>
 
+#include "loopbit/ray_geometry.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -17,10 +19,6 @@ constexpr std::size_t kFewPairs = 40;
 constexpr int kStarts = 8;
 constexpr int kFirstSteps = 6;
 constexpr int kLastSteps = 10;
-
-cv::Matx33d cross_matrix(const cv::Vec3d& v) {
-  return {0, -v[2], v[1], v[2], 0, -v[0], -v[1], v[0], 0};
-}
 
 /// Of the nearest essential matrix. Of its four motions any will do: all have the same matrix.
 ViewMotion nearest_motion(const cv::Matx33d& model) {
@@ -40,20 +38,7 @@ cv::Matx33d rotation_between(std::span<const ViewRayPair> pairs) {
   for (const ViewRayPair& pair : pairs) {
     sum += cv::Vec3d(pair.second.direction) * cv::Vec3d(pair.first.direction).t();
   }
-  cv::Matx31d values;
-  cv::Matx33d u;
-  cv::Matx33d v_t;
-  cv::SVD::compute(sum, values, u, v_t);
-  return u * cv::Matx33d(1, 0, 0, 0, 1, 0, 0, 0, cv::determinant(u * v_t)) * v_t;
-}
-
-cv::Matx33d rotation_by(const cv::Vec3d& r) {
-  const double angle = cv::norm(r);
-  const cv::Matx33d k = cross_matrix(r);
-  constexpr double kTiny = 1e-9;
-  if (angle < kTiny) return cv::Matx33d::eye() + k;
-  return cv::Matx33d::eye() + k * (std::sin(angle) / angle) +
-         k * k * ((1 - std::cos(angle)) / (angle * angle));
+  return best_rotation(sum);
 }
 
 /// J^T W J, J^T W r and the robust cost, for a motion (x, y, z, rx, ry, rz).
@@ -135,14 +120,6 @@ double descend(std::span<const ViewRayPair> pairs, int max_steps, double huber_p
   return at.cost;
 }
 
-/// A translation and its opposite have the same essential matrix. A spiral of equal areas.
-cv::Vec3d on_half_sphere(int i) {
-  constexpr double kGoldenAngle = 2.399963229728653;
-  const double z = (i + 0.5) / kStarts;
-  const double radius = std::sqrt(1 - z * z);
-  return {radius * std::cos(i * kGoldenAngle), radius * std::sin(i * kGoldenAngle), z};
-}
-
 std::vector<ViewRayPair> thinned(std::span<const ViewRayPair> pairs) {
   if (pairs.size() <= kFewPairs) return {pairs.begin(), pairs.end()};
   std::vector<ViewRayPair> few;
@@ -160,7 +137,7 @@ ViewMotion find_motion(std::span<const ViewRayPair> pairs, const cv::Matx33d& mo
   const std::vector<ViewRayPair> few = thinned(pairs);
   const cv::Matx33d rotation = rotation_between(few);
   std::vector<ViewMotion> starts{nearest_motion(model)};
-  for (int i = 0; i < kStarts; ++i) starts.push_back({rotation, on_half_sphere(i)});
+  for (const cv::Vec3d& direction : half_sphere(kStarts)) starts.push_back({rotation, direction});
   ViewMotion best;
   double least = std::numeric_limits<double>::infinity();
   for (ViewMotion& motion : starts) {
