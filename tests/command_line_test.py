@@ -87,6 +87,26 @@ class CommandLineTest(CommandTest):
         record = json.loads((self.out / "run.json").read_text())
         self.assertEqual(record["camera"], str(camera))
 
+    def test_a_camera_gives_a_recognised_image_its_pose(self):
+        town = self.scratch / "town.db"
+        first = self.images / "000000.png"
+        self.assertEqual(loopbit("run", self.images, "--map", town, "--limit", "30", "--no-poses").returncode, 0)
+        camera = self.dataset / "camera.yaml"
+        ran = loopbit("query", town, first, "--camera", camera, "--json")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        pose = json.loads(ran.stdout)["relative_pose"]
+        self.assertEqual((pose["status"], pose["known"]), ("pure_rotation", "rotation"))  # the same image
+        for row in range(4):
+            for column in range(4):
+                self.assertAlmostEqual(pose["T_match_query"][row][column], float(row == column), places=3)
+        self.assertEqual([len(row) for row in pose["covariance"]], [6] * 6)
+        self.assertIn("relative pose: pure_rotation, rotation, x y z qx qy qz qw 0 0 0",
+                      loopbit("query", town, first, "--camera", camera).stdout)
+        self.assertNotIn("relative_pose", loopbit("query", town, first, "--json").stdout)
+        ran = loopbit("query", town, first, "--camera", self.camera_for(640))
+        self.assertEqual(ran.returncode, 3)
+        self.assertIn("640", ran.stderr)
+
     @unittest.skipIf(QUICK, "too few frames")
     def test_relative_poses_have_the_rotations_of_the_truth(self):
         ran = loopbit("run", self.images, "--out", self.out, "--no-report",

@@ -11,13 +11,16 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "loopbit/camera_file.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/folder_watch.hpp"
+#include "loopbit/gray_image.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
 #include "loopbit/printable.hpp"
 #include "loopbit/record_run.hpp"
 #include "loopbit/recordings.hpp"
+#include "loopbit/relative_pose.hpp"
 
 #include "commands.hpp"
 #include "map_output.hpp"
@@ -36,6 +39,7 @@ struct QueryFlags {
   std::vector<std::string> images;
   std::string topic;
   std::string mask;
+  std::string camera;
   std::string watch;
   std::size_t places = 3;
   std::string place_images;
@@ -80,19 +84,58 @@ void print_row(const std::string& image, std::string_view status, const ShownPla
              shown.image.empty() ? "" : "  ", printable(shown.image));
 }
 
-void print_rows(const std::string& name, Status status, const std::vector<ShownPlace>& places) {
+/// What a map says of an image.
+struct Answer {
+  Status status = Status::unreadable;
+  std::vector<ShownPlace> places = {};
+  std::optional<RelativePose> pose =
+      std::nullopt;  ///< of the image, in the frame of the first place
+};
+
+void print_pose(const RelativePose& pose) {
+  fmt::print("{:<24}  relative pose: {}, {}", "", to_string(pose.status), to_string(pose.known));
+  if (pose.known != PoseKnown::nothing) fmt::print(", x y z qx qy qz qw {}", to_tum_pose(pose));
+  fmt::print("\n");
+}
+
+void print_rows(const std::string& name, const Answer& answer) {
   const std::string image = printable(name);
-  if (places.empty()) fmt::print("{:<24}  {}\n", image, to_string(status));
+  const auto& places = answer.places;
+  if (places.empty()) fmt::print("{:<24}  {}\n", image, to_string(answer.status));
   for (std::size_t i = 0; i < places.size(); ++i) {
-    print_row(i == 0 ? image : "", i == 0 ? to_string(status) : "", places[i]);
+    print_row(i == 0 ? image : "", i == 0 ? to_string(answer.status) : "", places[i]);
+    if (i == 0 && answer.pose) print_pose(*answer.pose);
   }
 }
 
+template <int rows, int columns>
+nlohmann::ordered_json rows_of(const cv::Matx<double, rows, columns>& matrix) {
+  auto result = nlohmann::ordered_json::array();
+  for (int row = 0; row < rows; ++row) {
+    result.push_back(std::vector<double>(matrix.val + std::ptrdiff_t{row} * columns,
+                                         matrix.val + std::ptrdiff_t{row + 1} * columns));
+  }
+  return result;
+}
+
+nlohmann::ordered_json json_of(const RelativePose& pose) {
+  nlohmann::ordered_json json{{"status", to_string(pose.status)},
+                              {"known", to_string(pose.known)},
+                              {"matches", pose.matches},
+                              {"inliers", pose.inliers.size()}};
+  if (pose.known == PoseKnown::nothing) return json;
+  json["rms_px"] = pose.rms_px;
+  json["T_match_query"] = rows_of(pose.T_match_query);
+  json["covariance"] = rows_of(pose.covariance);
+  return json;
+}
+
 /// One line an image, so that a program can read them as they come.
-void print_line(const std::string& image, Status status, const std::vector<ShownPlace>& places) {
-  nlohmann::ordered_json json{
-      {"image", image}, {"status", to_string(status)}, {"places", nlohmann::ordered_json::array()}};
-  for (const auto& [place, file] : places) {
+void print_line(const std::string& image, const Answer& answer) {
+  nlohmann::ordered_json json{{"image", image},
+                              {"status", to_string(answer.status)},
+                              {"places", nlohmann::ordered_json::array()}};
+  for (const auto& [place, file] : answer.places) {
     json["places"].push_back({{"session", place.place.session},
                               {"frame", place.place.frame},
                               {"score", place.score},
@@ -101,6 +144,7 @@ void print_line(const std::string& image, Status status, const std::vector<Shown
                               {"inliers", place.inliers}});
     if (!file.empty()) json["places"].back()["image"] = file;
   }
+  if (answer.pose) json["relative_pose"] = json_of(*answer.pose);
   const std::string text =
       json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   fmt::print("{}\n", printable_json(text));
@@ -112,8 +156,12 @@ class Relocalizer {
   explicit Relocalizer(const QueryFlags& flags)
       : flags_(flags),
         map_(std::make_shared<MapReader>(flags.map, flags.map_cache_mb)),
-        detector_(detector_options(*map_, flags), map_) {
+        detector_(detector_options(*map_, flags), map_),
+        surf_(detector_.options().surf) {
     if (!flags.mask.empty()) detector_.set_mask(read_mask(flags.mask));
+    if (!flags.camera.empty()) camera_ = read_camera(flags.camera);
+    // As in a run: through other lenses it finds no more than without.
+    if (camera_ && camera_->lens == Lens::equidistant) detector_.set_camera(camera_);
     if (!flags.place_images.empty()) place_images_.emplace(*map_, flags.place_images);
     if (!flags.json) {
       fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7}  {:>10}  {:>7}\n", "image", "status",
@@ -146,28 +194,40 @@ class Relocalizer {
 
  private:
   void answer(const Frame& frame) {
+    Answer answer;
     std::vector<RankedPlace> places;
-    Status status = Status::unreadable;
     try {
       if (!frame.error.empty()) throw Error(ErrorKind::input, frame.error);
-      status = detector_.query(frame.image, std::nullopt, &places).status;
+      if (camera_) check_size(*camera_, fmt::format("'{}'", flags_.camera), frame.image.size());
+      answer.status = detector_.query(frame.image, std::nullopt, &places).status;
       any_readable_ = true;
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;
       tell(fmt::format("loopbit: '{}': {}\n", frame.name, error.what()));
     }
+    if (camera_ && answer.status == Status::loop) answer.pose = pose_of(frame, places.front());
     if (places.size() > flags_.places) places.resize(flags_.places);
-    std::vector<ShownPlace> shown;
-    shown.reserve(places.size());
     for (const RankedPlace& place : places) {
-      shown.push_back({place, place_images_ ? place_images_->file_of(place.place) : ""});
+      answer.places.push_back({place, place_images_ ? place_images_->file_of(place.place) : ""});
     }
-    (flags_.json ? print_line : print_rows)(frame.name, status, shown);
+    (flags_.json ? print_line : print_rows)(frame.name, answer);
+  }
+
+  /// None if the place is of images of another size.
+  std::optional<RelativePose> pose_of(const Frame& frame, const RankedPlace& place) {
+    Features query;
+    surf_.extract(gray_image(frame.image), query);
+    const Features match = detector_.features_of(place.place);
+    if (query.working_size_px != match.working_size_px) return std::nullopt;
+    return estimator_.estimate({.query = {&query, &*camera_}, .match = {&match, &*camera_}});
   }
 
   const QueryFlags& flags_;
   std::shared_ptr<MapReader> map_;
   LoopDetector detector_;
+  std::optional<CameraModel> camera_;
+  SurfExtractor surf_;
+  RelativePoseEstimator estimator_;
   std::optional<PlaceImages> place_images_;
   bool any_readable_ = false;
 };
@@ -218,6 +278,12 @@ void add_query(CLI::App& app, int& exit_code) {
   add_image_flag(*command, flags->max_megapixels);
   add_topic_flag(*command, flags->topic);
   add_mask_flag(*command, flags->mask);
+  command
+      ->add_option(
+          "--camera", flags->camera,
+          "Calibration of the images and those of the map (as for 'loopbit run'): each "
+          "recognised image gets its relative pose, and a fisheye is recognised more often")
+      ->type_name("FILE");
   command->add_flag("--json", flags->json, "Print one JSON object per image, one per line");
   command
       ->add_option("--set", flags->settings,
