@@ -117,8 +117,8 @@ void GraphImpl::solve() {
   start_from_relaxation();
   reject_improbable();
   solve_kept();
-  // Of loops that only others or odometry contradicted, those that fit.
-  keep_what_fits();
+  // Of loops that only others or odometry contradicted, those that fit, and what they bring near.
+  while (keep_what_fits()) solve_whole();
   measure_chi2();
   judged_ = loops_.size();
   for (const std::size_t i : of_verdict(LoopVerdict::kept)) {
@@ -246,7 +246,8 @@ void GraphImpl::solve_kept() {
 
 /// Odometry may have drifted further than it hardly ever does. That other loops moved the poses to
 /// where such a loop puts them is no accident if it is metric; anything less fits a place nearby.
-void GraphImpl::keep_what_fits() {
+/// Whether there is any.
+bool GraphImpl::keep_what_fits() {
   bool any = false;
   for (std::size_t i = 0; i < loops_.size(); ++i) {
     JudgedLoop& loop = loops_[i];
@@ -257,7 +258,7 @@ void GraphImpl::keep_what_fits() {
     loop.verdict = LoopVerdict::kept;
     any = true;
   }
-  if (any) solve_whole();
+  return any;
 }
 
 void GraphImpl::update() {

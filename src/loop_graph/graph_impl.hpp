@@ -51,7 +51,7 @@ class GraphImpl {
   void start_from_relaxation();
   void reject_improbable();
   void solve_kept();
-  void keep_what_fits();
+  bool keep_what_fits();
 
   // The steps of update().
   bool judge_new_loops();
