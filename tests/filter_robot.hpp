@@ -47,6 +47,7 @@ struct FilterRobot {
   KnownLoops loops;
   std::function<bool(std::ptrdiff_t)> may_be_at = [](std::ptrdiff_t) { return true; };
   std::function<double(std::ptrdiff_t)> return_weight = [](std::ptrdiff_t) { return 1.0; };
+  std::function<bool(std::ptrdiff_t)> may_match = [](std::ptrdiff_t) { return true; };
   std::size_t num_similar = kSimilar;
   int frame = 0;
   LateLoops::Found changed;  ///< by the latest frame
@@ -59,6 +60,7 @@ struct FilterRobot {
       all.push_back(candidate(step, {2 + static_cast<int>(random() % 5)}));
     }
     for (const auto& [step, at] : found) all.push_back(candidate(step, at));
+    for (VerifiedCandidate& c : all) c.may_match = may_match(c.step);
     return all;
   }
 

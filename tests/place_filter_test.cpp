@@ -154,6 +154,42 @@ TEST(PlaceFilter, TooFewCandidatesTellNothingOfVotes) {
   EXPECT_GT(some.revisit, 0.5);
 }
 
+TEST(PlaceFilter, PlacesThatCannotMatchShowWhatWrongOnesHave) {
+  FilterRobot all;
+  FilterRobot few;
+  few.may_match = [](std::ptrdiff_t step) { return step < 1000; };
+  const auto expected = all.follow(100, 1, 15, kByNight);
+  const auto update = few.follow(100, 1, 15, kByNight);
+  EXPECT_TRUE(update.has_null);
+  EXPECT_NEAR(update.observed.back().votes, expected.observed.back().votes, 0.5);
+  EXPECT_GT(update.probability, 0.98);
+}
+
+TEST(PlaceFilter, APlaceThatCannotMatchDoesNot) {
+  FilterRobot robot;
+  robot.may_match = [](std::ptrdiff_t step) { return step < 1000; };
+  const auto update = robot.look({{100, {.votes = 4}}, {2000, {.votes = 60}}});
+  EXPECT_EQ(matched_step(update), 100);
+  EXPECT_LT(update.revisit, 0.01);
+  robot.may_match = [](std::ptrdiff_t) { return false; };
+  EXPECT_FALSE(robot.look({{100, kByDay}}).match);
+}
+
+TEST(PlaceFilter, AStoreyThatCannotMatchSaysNothingOfPaths) {
+  FilterRobot robot;
+  robot.may_match = [](std::ptrdiff_t step) { return step < 500; };
+  FilterRobot without;
+  without.may_match = robot.may_match;
+  for (int i = 0; i < 40; ++i) {
+    robot.see({{500 + i, {.votes = 40}}});
+    without.see({});
+  }
+  const FoundAt found{{100, kByNight}};
+  const double votes = without.look(found).observed.back().votes;
+  EXPECT_GT(votes, 2);
+  EXPECT_NEAR(robot.look(found).observed.back().votes, votes, 0.5);
+}
+
 TEST(PlaceFilter, MapsFullOfLookAlikesDemandMoreInliers) {
   const FoundAt found{{100, {.votes = 4, .inliers = 25}}};
   FilterRobot robot;

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
 namespace loopbit {
@@ -78,7 +77,10 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
                                                          std::size_t num_similar) {
   Frame frame{query, {}, {}, {}};
   frame.verified.reserve(candidates.size());
-  for (const Candidate& c : candidates) frame.verified.push_back({c, places_.step_of(c.place)});
+  for (const Candidate& c : candidates) {
+    frame.verified.push_back(
+        {c, places_.step_of(c.place), !query.may_match || query.may_match(c.place)});
+  }
   looks_.resize(std::max(looks_.size(), candidates.size()));
   verifications_.resize(std::max(verifications_.size(), candidates.size()));
   look(frame);
@@ -114,8 +116,11 @@ void CandidateVerifier::look(Frame& frame) {
 /// that shares keypoints shares strong ones, too.
 void CandidateVerifier::look_closer(Frame& frame, std::size_t first, std::size_t last,
                                     std::size_t most) {
-  std::vector<std::size_t> order(last - first);
-  std::iota(order.begin(), order.end(), first);
+  std::vector<std::size_t> order;
+  order.reserve(last - first);
+  for (std::size_t i = first; i < last; ++i) {
+    if (frame.verified[i].may_match) order.push_back(i);
+  }
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
     return looks_[a].matches.size() > looks_[b].matches.size();
   });
@@ -130,7 +135,8 @@ void CandidateVerifier::look_closer(Frame& frame, std::size_t first, std::size_t
 void CandidateVerifier::look_at_others(Frame& frame) {
   for (std::size_t i = 0; i < frame.verified.size(); ++i) {
     const VerifiedCandidate& v = frame.verified[i];
-    if (v.geometry || !is_elsewhere(frame, v) || !frame.may_share(looks_[i].matches)) continue;
+    if (!v.may_match || v.geometry || !is_elsewhere(frame, v)) continue;
+    if (!frame.may_share(looks_[i].matches)) continue;
     verifier_.match_some(frame.query.features, frame.features, places_.features(v.candidate.place),
                          verification_);
     if (verification_.matches.size() >= kMinSharedMatches) verify_in_full(frame, i, true);

@@ -38,6 +38,7 @@ struct CandidateGeometry {
 struct VerifiedCandidate {
   Candidate candidate;
   std::ptrdiff_t step = 0;  ///< the candidate's position along the path, see RecentView::step_of
+  bool may_match = true;    ///< false: it only shows what wrong places have
   int votes = 0;            ///< see DisplacementVotes
   std::optional<CandidateGeometry> geometry = std::nullopt;  ///< if it may be more than chance
 };
@@ -58,6 +59,7 @@ class CandidateVerifier {
     int view_inliers = 0;  ///< see inlier_worth()
     bool closely = false;  ///< the first look matches all keypoints, not only the strongest
     const CameraModel* camera = nullptr;  ///< see epipolar_inliers()
+    PlaceTest may_match = {};             ///< empty = all may; the others are only looked at once
   };
 
   /// What is known of places.

@@ -53,6 +53,9 @@ constexpr std::size_t kFollowedPaths = 3;
 constexpr double kMinFollowedProbability = 2e-3;
 /// On each, the places up to so many steps away.
 constexpr std::ptrdiff_t kFollowedReach = 2;
+/// With odometry, so many times as many places are looked up: those of other storeys may look more
+/// alike than the one where the robot is.
+constexpr int kLookAlikes = 10;
 /// A frame is compared with all its keypoints if the robot is at an earlier place with this
 /// probability, so that most new places cost little.
 constexpr double kWorthACloserLook = 0.1;
@@ -140,10 +143,11 @@ class LoopDetector::Impl {
     Features features;
     RecentView::Look look;
     PlaceTest is_allowed;  ///< as a candidate; empty = all places are
-    PlaceTest is_too_far;  ///< by odometry; empty = there is none
     std::optional<Reach> reach;
-    int view_inliers = 0;   ///< see inlier_worth()
-    PlaceId compared = -1;  ///< the recent place that `work` compares it with
+    std::vector<Candidate> too_far;        ///< of the most similar places, those out of reach
+    std::vector<Candidate> also_in_reach;  ///< the most similar of the others
+    int view_inliers = 0;                  ///< see inlier_worth()
+    PlaceId compared = -1;                 ///< the recent place that `work` compares it with
     std::vector<VerifiedCandidate> verified;
     std::optional<VerifiedCandidate> best;  ///< of them
     bool closely = false;                   ///< see CandidateVerifier::Query
@@ -192,23 +196,25 @@ class LoopDetector::Impl {
     seen.look = look(seen);
     const PlaceId end = first_recent_place(seen.look, detection.timestamp_s);
     seen.is_allowed = filter_.test(allowed, seen.look.is_step);
-    if (detection.odometry) keep_in_reach(*detection.odometry, end, seen);
     seen.view_inliers = view_inliers(seen);
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
-    auto candidates = index_.query(seen.content, end, options_.retrieval, nullptr, seen.is_allowed);
+    auto candidates = similar_places(detection, end, seen);
     Belief prior = place_filter_.predict(seen.look.is_step);
     // Where the robot is sure to be back, half of them are rivals enough.
     const double revisit = 1 - prior.elsewhere();
     if (revisit >= options_.decision.min_score) candidates.resize((candidates.size() + 1) / 2);
     const std::size_t num_similar = candidates.size();
+    candidates.insert(candidates.end(), seen.also_in_reach.begin(), seen.also_in_reach.end());
     add_expected(seen, prior, end, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that features, geometry and the frames before agree on.
     seen.closely = revisit >= kWorthACloserLook;
-    seen.verified = seen.work->candidates.verify(verified_query(seen), candidates, num_similar);
+    CandidateVerifier::Query query = verified_query(seen);
+    if (!seen.too_far.empty()) query.may_match = seen.is_allowed;
+    seen.verified = seen.work->candidates.verify(query, candidates, num_similar);
     decide(seen, std::move(prior), num_similar, end, detection);
     report_unreachable(seen, end, detection);
     report_earlier_frames(seen, detection);
@@ -560,15 +566,39 @@ class LoopDetector::Impl {
     return most;
   }
 
+  /// The places most similar to the frame. By odometry, only those in reach may match. The others
+  /// still show what wrong places have, and in their stead less similar ones may match, too. `end`:
+  /// of the candidates.
+  std::vector<Candidate> similar_places(const Detection& detection, PlaceId end,
+                                        Observation& seen) const {
+    RetrievalOptions retrieval = options_.retrieval;
+    if (detection.odometry) retrieval.max_candidates *= kLookAlikes;
+    auto similar = index_.query(seen.content, end, retrieval, nullptr, seen.is_allowed);
+    if (!detection.odometry) return similar;
+    keep_in_reach(*detection.odometry, end, seen);
+    const auto most = static_cast<std::size_t>(options_.retrieval.max_candidates);
+    for (std::size_t i = 0; i < similar.size(); ++i) {
+      const bool in_reach = seen.is_allowed(similar[i].place);
+      if (i < most && !in_reach) seen.too_far.push_back(similar[i]);
+      if (i >= most && in_reach && seen.also_in_reach.size() < seen.too_far.size()) {
+        seen.also_in_reach.push_back(similar[i]);
+      }
+    }
+    similar.resize(std::min(most, similar.size()));
+    return similar;
+  }
+
   /// `end`: of the candidates.
   void keep_in_reach(const OdometryPose& odometry, PlaceId end, Observation& seen) const {
     seen.reach.emplace(odometry_, paths_, odometry, options_.decision);
-    const PlaceTest wanted = std::exchange(seen.is_allowed, {});
-    const auto test = [this, wanted, end, &reach = *seen.reach](PlaceId place, bool in_reach) {
-      return (!wanted || wanted(place)) && (chi2(reach, place, end) <= Reach::kMaxChi2) == in_reach;
+    seen.is_allowed = [this, end, &reach = *seen.reach,
+                       is_wanted = std::exchange(seen.is_allowed, {})](PlaceId place) {
+      return (!is_wanted || is_wanted(place)) && chi2(reach, place, end) <= Reach::kMaxChi2;
     };
-    seen.is_allowed = [test](PlaceId place) { return test(place, true); };
-    seen.is_too_far = [test](PlaceId place) { return test(place, false); };
+  }
+
+  static bool is_among(const std::vector<Candidate>& candidates, PlaceId place) {
+    return std::ranges::find(candidates, place, &Candidate::place) != candidates.end();
   }
 
   /// A loop that odometry does not doubt is a shortcut as soon as another one agrees with it, far
@@ -602,9 +632,7 @@ class LoopDetector::Impl {
       for (std::ptrdiff_t step = middle - kFollowedReach; step <= middle + kFollowedReach; ++step) {
         const auto place = place_of(step);
         if (!place || !is_candidate(*place, end, seen)) continue;
-        const bool is_there = std::ranges::any_of(
-            candidates, [&](const Candidate& other) { return other.place == *place; });
-        if (is_there) continue;
+        if (is_among(candidates, *place)) continue;
         const Candidate expected = candidate(*place, seen.content);
         // Nothing is like a frame that could not be read.
         if (expected.similarity > 0) candidates.push_back(expected);
@@ -615,13 +643,12 @@ class LoopDetector::Impl {
   void decide(Observation& seen, Belief prior, std::size_t num_similar, PlaceId end,
               Detection& detection) const {
     const DecisionOptions& decision = options_.decision;
-    if (seen.verified.empty()) {
+    if (std::ranges::none_of(seen.verified, &VerifiedCandidate::may_match)) {
       detection.status = end == 0 ? Status::no_earlier_place : Status::no_similar_place;
+    } else if (decision.count_matches) {
+      decide_by_matches(seen, detection);
     }
-    if (decision.count_matches) {
-      if (!seen.verified.empty()) decide_by_matches(seen, detection);
-      return;
-    }
+    if (decision.count_matches) return;
     const PlaceFilter::Steps steps{
         .number = steps_before(end),
         .may_be_at =
@@ -649,14 +676,12 @@ class LoopDetector::Impl {
   /// Evidence of a place out of reach, where there is no loop: either that place looks like this
   /// one, or odometry is wrong.
   void report_unreachable(Observation& seen, PlaceId end, Detection& detection) const {
-    constexpr int kLooks = 3;
+    constexpr std::size_t kLooks = 3;
     constexpr double kEvident = 0.5;
-    if (detection.status == Status::loop || !seen.is_too_far) return;
-    RetrievalOptions few = options_.retrieval;
-    few.max_candidates = kLooks;
-    const auto candidates = index_.query(seen.content, end, few, nullptr, seen.is_too_far);
+    if (detection.status == Status::loop || seen.too_far.empty()) return;
+    seen.too_far.resize(std::min(kLooks, seen.too_far.size()));
     const auto verified =
-        seen.work->candidates.verify(verified_query(seen), candidates, candidates.size());
+        seen.work->candidates.verify(verified_query(seen), seen.too_far, seen.too_far.size());
     const VerifiedCandidate* best = nullptr;
     double most = std::min(kEvident, options_.decision.min_score);
     for (const VerifiedCandidate& v : verified) {
@@ -717,7 +742,7 @@ class LoopDetector::Impl {
   /// As in the paper.
   void decide_by_matches(Observation& seen, Detection& detection) const {
     const auto& best = *std::ranges::max_element(seen.verified, {}, [&](const auto& v) {
-      return std::pair(score(v, seen), v.candidate.similarity);
+      return std::tuple(v.may_match, score(v, seen), v.candidate.similarity);
     });
     report_match(best, seen, detection);
     detection.score = score(*seen.best, seen);

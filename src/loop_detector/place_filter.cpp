@@ -118,13 +118,14 @@ ByStep log_ratios(const std::vector<PlaceFilter::Observed>& observed) {
   return largest_of_steps(observed, [](const auto& o) { return o.log_likelihood_ratio(); });
 }
 
-/// Of the candidates for which `is_eligible(o)`, the one with the largest `value(o)`.
+/// Of the candidates that may match and for which `is_eligible(o)`, the one with the largest
+/// `value(o)`.
 template <typename Eligible, typename Value>
 std::optional<std::size_t> best_of(const std::vector<PlaceFilter::Observed>& observed,
                                    const Eligible& is_eligible, const Value& value) {
   std::optional<std::size_t> best;
   for (std::size_t i = 0; i < observed.size(); ++i) {
-    if (!is_eligible(observed[i])) continue;
+    if (!observed[i].may_match || !is_eligible(observed[i])) continue;
     if (!best || value(observed[i]) > value(observed[*best])) best = i;
   }
   return best;
@@ -317,7 +318,10 @@ std::vector<PlaceFilter::Observed> PlaceFilter::observe(
   std::vector<Observed> observed;
   observed.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
-    Observed o{.candidate = verified[i].candidate, .step = verified[i].step, .sigmas = sigmas[i]};
+    Observed o{.candidate = verified[i].candidate,
+               .step = verified[i].step,
+               .may_match = verified[i].may_match,
+               .sigmas = sigmas[i]};
     if (num_similar >= kMinNull) o.votes = votes_log_ratio(sigmas[i], num_similar);
     if (verified[i].geometry) {
       o.excess = verified[i].geometry->excess();
@@ -338,7 +342,9 @@ PlaceFilter::Update PlaceFilter::update(Belief prior,
   std::erase_if(prior.places, [&](const Hypothesis& h) { return !known.may_be_at(h.step); });
   std::vector<std::ptrdiff_t> steps;
   steps.reserve(update.observed.size());
-  for (const Observed& o : update.observed) steps.push_back(o.step);
+  for (const Observed& o : update.observed) {
+    if (o.may_match) steps.push_back(o.step);
+  }
   update.returns = returns_to(std::move(steps), known.number, known.return_weight);
   add_returns(update.returns, prior);
   share_among_laps(loops, prior.places);
@@ -406,9 +412,14 @@ void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& nex
   }
   next.has_null = update.has_null;
   if (!update.has_null) return;
-  next.sigmas = largest_of_steps(wrong, [](const Observed& o) { return o.sigmas; });
+  const auto deviation = [](const Observed& o) { return o.sigmas; };
+  next.sigmas = largest_of_steps(wrong, deviation);
   for (const auto& [step, sigmas] : next.sigmas) {
     next.shown.push_back(std::clamp(sigmas + mean_shown(step), -kMaxLearned, kMaxLearned));
+  }
+  // Another storey, which cannot match, looks like this one all along a path.
+  std::erase_if(wrong, [](const Observed& o) { return !o.may_match; });
+  for (const auto& [step, sigmas] : largest_of_steps(wrong, deviation)) {
     const auto before = find_step(latest_sigmas_, step - 1);
     if (before == latest_sigmas_.end()) continue;
     next.products += sigmas * before->second;

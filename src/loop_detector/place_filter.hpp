@@ -35,10 +35,11 @@ class PlaceFilter {
   struct Observed {
     Candidate candidate;
     std::ptrdiff_t step = 0;
-    double votes = 0;     ///< log likelihood ratio of its displacement votes
-    double geometry = 0;  ///< the same of its inliers
-    double sigmas = 0;    ///< votes in standard deviations of the null; 0 where there is no null
-    double excess = 0;    ///< of CandidateGeometry, 0 if it was not looked at closer
+    bool may_match = true;  ///< see VerifiedCandidate
+    double votes = 0;       ///< log likelihood ratio of its displacement votes
+    double geometry = 0;    ///< the same of its inliers
+    double sigmas = 0;      ///< votes in standard deviations of the null; 0 where there is no null
+    double excess = 0;      ///< of CandidateGeometry, 0 if it was not looked at closer
 
     [[nodiscard]] double log_likelihood_ratio() const;
   };
