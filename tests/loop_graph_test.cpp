@@ -36,11 +36,6 @@ namespace {
 
 using bench::SyntheticGraph;
 
-cv::Matx44d pose_at(double x, double z, double yaw) {
-  return {std::cos(yaw),  0, std::sin(yaw), x, 0, 1, 0, 0,
-          -std::sin(yaw), 0, std::cos(yaw), z, 0, 0, 0, 1};
-}
-
 cv::Matx66d diagonal(double position_m, double rotation) {
   const double p = position_m * position_m;
   const double r = rotation * rotation;
@@ -75,8 +70,8 @@ std::vector<LoopVerdict> verdicts_of(const LoopGraph& graph) {
 TEST(LoopGraphTest, ErrorIsSharedByVariances) {
   LoopGraph graph(kExact);
   graph.add_keyframe();
-  for (int k = 0; k < 4; ++k) graph.add_keyframe({pose_at(0, 1, 0), diagonal(0.1, 0.001)});
-  graph.add_loop({0, 4, PoseKnown::metric, pose_at(0, 4.5, 0), diagonal(0.1, 0.001)});
+  for (int k = 0; k < 4; ++k) graph.add_keyframe({level_pose(0, 1, 0), diagonal(0.1, 0.001)});
+  graph.add_loop({0, 4, PoseKnown::metric, level_pose(0, 4.5, 0), diagonal(0.1, 0.001)});
   graph.solve();
   ASSERT_EQ(graph.loops()[0].verdict, LoopVerdict::kept);
   for (int k = 0; k <= 4; ++k) EXPECT_NEAR(graph.pose(k)(2, 3), 1.1 * k, 1e-6) << k;
@@ -94,12 +89,12 @@ TEST(LoopGraphTest, DirectionAndRotationTurnAStep) {
   LoopGraph graph({.seen_within_m = 1000, .least_position_m = 0, .least_rotation_deg = 0});
   graph.add_keyframe();
   // The heading is uncertain: 5 degrees wrong after the first step.
-  graph.add_keyframe({pose_at(0, 0, 5 * std::numbers::pi / 180), diagonal(1e-4, 0.1)});
-  graph.add_keyframe({pose_at(0, 10, 0), diagonal(1e-3, 1e-4)});
+  graph.add_keyframe({level_pose(0, 0, 5 * std::numbers::pi / 180), diagonal(1e-4, 0.1)});
+  graph.add_keyframe({level_pose(0, 10, 0), diagonal(1e-3, 1e-4)});
   // True direction: straight on.
   cv::Matx66d covariance = diagonal(0.001, 0.001);
   covariance(2, 2) = 0;
-  graph.add_loop({0, 2, PoseKnown::direction, pose_at(0, 1, 0), covariance});
+  graph.add_loop({0, 2, PoseKnown::direction, level_pose(0, 1, 0), covariance});
   graph.solve();
   EXPECT_EQ(graph.loops()[0].verdict, LoopVerdict::kept);
   EXPECT_NEAR(graph.pose(2)(0, 3), 0, 1e-3);
@@ -384,7 +379,7 @@ TEST(LoopGraphTest, PathCovarianceTakesTheMostCertainPath) {
   std::vector<graph::Pose> poses;
   std::vector<graph::WideLoop> motions;
   const graph::Matrix6d step = graph::eigen_of(diagonal(0.1, 0.01));
-  for (int k = 0; k <= 10; ++k) poses.push_back(graph::pose_of(pose_at(0, k, 0)));
+  for (int k = 0; k <= 10; ++k) poses.push_back(graph::pose_of(level_pose(0, k, 0)));
   for (int k = 0; k < 10; ++k) motions.push_back({k, k + 1, graph::kIdentity, step});
   const auto chain = graph::PathCovariance(poses, motions).between(2, 7);
   ASSERT_TRUE(chain);
@@ -402,11 +397,12 @@ TEST(LoopGraphTest, PathCovarianceTakesTheMostCertainPath) {
 TEST(LoopGraphTest, EvidenceNamesTheReason) {
   const auto straight = [](LoopGraph& graph, int steps) {
     graph.add_keyframe();
-    for (int k = 0; k < steps; ++k) graph.add_keyframe({pose_at(0, 1, 0), diagonal(0.02, 0.002)});
+    for (int k = 0; k < steps; ++k)
+      graph.add_keyframe({level_pose(0, 1, 0), diagonal(0.02, 0.002)});
   };
   LoopGraph graph;
   straight(graph, 100);
-  graph.add_loop({0, 100, PoseKnown::metric, pose_at(0, 0, 0), diagonal(0.05, 0.005)});
+  graph.add_loop({0, 100, PoseKnown::metric, level_pose(0, 0, 0), diagonal(0.05, 0.005)});
   graph.solve();
   EXPECT_EQ(graph.loops()[0].verdict, LoopVerdict::unreachable);
   EXPECT_GT(*graph.loops()[0].odometry_chi2, graph.loops()[0].limit);
@@ -416,7 +412,8 @@ TEST(LoopGraphTest, EvidenceNamesTheReason) {
   straight(many, 100);
   for (int k = 90; k < 100; ++k) {
     const double error = k == 95 ? 0.5 : 0;
-    many.add_loop({k - 90, k, PoseKnown::metric, pose_at(0, 90 + error, 0), diagonal(0.02, 0.002)});
+    many.add_loop(
+        {k - 90, k, PoseKnown::metric, level_pose(0, 90 + error, 0), diagonal(0.02, 0.002)});
   }
   many.solve();
   for (std::size_t i = 0; i < 10; ++i) {
@@ -431,9 +428,9 @@ TEST(LoopGraphTest, EvidenceNamesTheReason) {
 TEST(LoopGraphTest, AMetricLoopBeyondDriftIsKeptWhereOthersPutItToo) {
   LoopGraph graph;
   graph.add_keyframe();
-  for (int k = 0; k < 100; ++k) graph.add_keyframe({pose_at(0, 1, 0), diagonal(0.02, 0.002)});
+  for (int k = 0; k < 100; ++k) graph.add_keyframe({level_pose(0, 1, 0), diagonal(0.02, 0.002)});
   const auto add = [&](int query, double error_m) {
-    const cv::Matx44d pose = pose_at(0, 90 + error_m, 0);
+    const cv::Matx44d pose = level_pose(0, 90 + error_m, 0);
     return graph.add_loop({query - 90, query, PoseKnown::metric, pose, diagonal(0.05, 0.005)});
   };
   for (int query = 90; query < 97; ++query) add(query, 0.85);
@@ -450,8 +447,8 @@ TEST(LoopGraphTest, AMetricLoopBeyondDriftIsKeptWhereOthersPutItToo) {
 TEST(LoopGraphTest, SessionsAreJoinedByLoops) {
   // The second session drives the same curve, from elsewhere.
   LoopGraph graph;
-  const cv::Matx44d step = pose_at(0, 1, 0.1);
-  const cv::Matx44d start = pose_at(1.5, 0.5, 0.2);
+  const cv::Matx44d step = level_pose(0, 1, 0.1);
+  const cv::Matx44d start = level_pose(1.5, 0.5, 0.2);
   graph.add_keyframe();
   for (int k = 0; k < 20; ++k) graph.add_keyframe({step, diagonal(0.01, 0.001)});
   const int second = graph.add_keyframe();
@@ -514,21 +511,21 @@ TEST(LoopGraphTest, SameCallsGiveTheSameBits) {
 TEST(LoopGraphTest, BadInputIsNamed) {
   LoopGraph graph;
   expect_error(ErrorKind::input, {"keyframe 0", "before"}, [&] {
-    graph.add_keyframe({pose_at(0, 1, 0), diagonal(0.1, 0.1)});
+    graph.add_keyframe({level_pose(0, 1, 0), diagonal(0.1, 0.1)});
   });
   graph.add_keyframe();
   expect_error(ErrorKind::input, {"odometry of keyframe 1", "positive definite"}, [&] {
-    graph.add_keyframe({pose_at(0, 1, 0), cv::Matx66d::zeros()});
+    graph.add_keyframe({level_pose(0, 1, 0), cv::Matx66d::zeros()});
   });
-  graph.add_keyframe({pose_at(0, 1, 0), diagonal(0.1, 0.1)});
+  graph.add_keyframe({level_pose(0, 1, 0), diagonal(0.1, 0.1)});
   expect_error(ErrorKind::input, {"keyframes 2 and 0", "from 0 to 1"}, [&] {
-    graph.add_loop({0, 2, PoseKnown::metric, pose_at(0, 0, 0), diagonal(1, 1)});
+    graph.add_loop({0, 2, PoseKnown::metric, level_pose(0, 0, 0), diagonal(1, 1)});
   });
   expect_error(ErrorKind::input, {"keyframes 1 and 0", "length 1"}, [&] {
-    graph.add_loop({0, 1, PoseKnown::direction, pose_at(0, 0, 0), diagonal(1, 1)});
+    graph.add_loop({0, 1, PoseKnown::direction, level_pose(0, 0, 0), diagonal(1, 1)});
   });
   expect_error(ErrorKind::input, {"keyframes 1 and 0", "positive definite"}, [&] {
-    graph.add_loop({0, 1, PoseKnown::metric, pose_at(0, 0, 0), diagonal(-1, 1) * -1.0});
+    graph.add_loop({0, 1, PoseKnown::metric, level_pose(0, 0, 0), diagonal(-1, 1) * -1.0});
   });
   expect_error(ErrorKind::option, {"graph.window"}, [] { LoopGraph({.window = 0}); });
   EXPECT_TRUE(graph.loops().empty());

@@ -19,19 +19,13 @@ namespace {
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 
-/// Turned by `yaw` about the camera's y axis.
-cv::Matx44d pose_at(double x, double z, double yaw) {
-  return {std::cos(yaw),  0, std::sin(yaw), x, 0, 1, 0, 0,
-          -std::sin(yaw), 0, std::cos(yaw), z, 0, 0, 0, 1};
-}
-
 TEST(OdometryTest, DriftGrowsWithTheSquareRootOfTheDistance) {
   const OdometryDrift drift{.position_per_m = 0.01,
                             .rotation_deg_per_m = 1e-5,
                             .rotation_per_rad = 0,
                             .correlated_m = 10};
   OdometryTrack track(drift);
-  for (int k = 0; k <= 1000; ++k) track.add(OdometryPose{pose_at(0, k, 0)});
+  for (int k = 0; k <= 1000; ++k) track.add(OdometryPose{level_pose(0, k, 0)});
   // 1 % of 10 m, and 10 times as much after 100 times the distance.
   EXPECT_NEAR(std::sqrt(track.between(0, 10)->covariance(2, 2)), 0.1, 1e-3);
   EXPECT_NEAR(std::sqrt(track.between(0, 1000)->covariance(2, 2)), 1.0, 1e-2);
@@ -41,7 +35,7 @@ TEST(OdometryTest, DriftGrowsWithTheSquareRootOfTheDistance) {
 TEST(OdometryTest, RotationMovesWhatIsFarAway) {
   OdometryDrift drift{.position_per_m = 1e-5, .rotation_deg_per_m = 0.1, .rotation_per_rad = 0};
   OdometryTrack track(drift);
-  for (int k = 0; k <= 100; ++k) track.add(OdometryPose{pose_at(0, k, 0)});
+  for (int k = 0; k <= 100; ++k) track.add(OdometryPose{level_pose(0, k, 0)});
   const Motion motion = track.between(0, 100).value();
   const double turn = std::sqrt(motion.covariance(4, 4));
   EXPECT_NEAR(turn * kDegrees, 0.1 * std::sqrt(10.0 * 100), 0.01);
@@ -52,9 +46,9 @@ TEST(OdometryTest, RotationMovesWhatIsFarAway) {
 /// The covariance of 1000 noisy drives.
 TEST(OdometryTest, CovarianceIsThatOfNoisyMotions) {
   const cv::Matx66d step_covariance = cv::Matx66d::diag({1e-4, 2e-4, 3e-4, 1e-6, 4e-6, 2e-6});
-  const cv::Matx44d step = pose_at(0.3, 1, 0.2);
+  const cv::Matx44d step = level_pose(0.3, 1, 0.2);
   OdometryTrack track;
-  cv::Matx44d at = pose_at(5, 7, 2);
+  cv::Matx44d at = level_pose(5, 7, 2);
   for (int k = 0; k <= 20; ++k) {
     track.add(OdometryPose{at, step_covariance});
     at = at * step;
@@ -97,9 +91,9 @@ TEST(OdometryTest, CovarianceIsThatOfNoisyMotions) {
 
 TEST(OdometryTest, FramesWithoutOdometryAreBridged) {
   OdometryTrack track;
-  track.add(OdometryPose{pose_at(0, 0, 0)});
+  track.add(OdometryPose{level_pose(0, 0, 0)});
   track.add(std::nullopt);
-  track.add(OdometryPose{pose_at(0, 2, 0)});
+  track.add(OdometryPose{level_pose(0, 2, 0)});
   EXPECT_FALSE(track.between(0, 1));
   EXPECT_FALSE(track.between(1, 2));
   EXPECT_NEAR(track.between(0, 2)->T_from_to(2, 3), 2, 1e-12);
@@ -127,7 +121,7 @@ TEST(OdometryTest, BadPosesAreErrorsAndChangeNothing) {
 TEST(TrajectoryErrorTest, AlignmentLeavesOnlyTheError) {
   std::vector<cv::Vec3d> truth;
   std::vector<cv::Vec3d> moved;
-  const cv::Matx44d T = pose_at(10, -3, 1.2);
+  const cv::Matx44d T = level_pose(10, -3, 1.2);
   for (int k = 0; k < 20; ++k) {
     truth.emplace_back(k, 0.1 * k * k, k % 5);
     moved.push_back(T.get_minor<3, 3>(0, 0) * truth.back() + rigid::translation(T));

@@ -3,6 +3,7 @@
 #include "test_support.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <vector>
@@ -34,6 +35,11 @@ std::ostream& operator<<(std::ostream& stream, ErrorKind kind) {
 namespace loopbit::test {
 
 namespace fs = std::filesystem;
+
+cv::Matx44d level_pose(double x, double z, double yaw) {
+  return {std::cos(yaw),  0, std::sin(yaw), x, 0, 1, 0, 0,
+          -std::sin(yaw), 0, std::cos(yaw), z, 0, 0, 0, 1};
+}
 
 std::uint64_t Random::bits() {  // SplitMix64
   state_ += 0x9e3779b97f4a7c15U;

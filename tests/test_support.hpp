@@ -33,6 +33,9 @@ std::ostream& operator<<(std::ostream& stream, ErrorKind kind);
 
 namespace loopbit::test {
 
+/// T_world_camera of a camera that turned by `yaw`, radians, about the vertical axis.
+cv::Matx44d level_pose(double x, double z, double yaw);
+
 /// Random numbers that are the same on every machine, which those of <random>'s distributions are
 /// not. Every test starts from the same seed; another `stream` has other numbers.
 class Random {

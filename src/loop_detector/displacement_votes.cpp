@@ -58,7 +58,7 @@ bool is_in_square(std::int16_t bin, std::int16_t square) {
   return offset == 0 || offset == 1 || offset == kBinStride || offset == kBinStride + 1;
 }
 
-const Keypoint& keypoint(const Features& features, int index) {
+const Keypoint& keypoint_of(const Features& features, int index) {
   return features.keypoints[static_cast<std::size_t>(index)];
 }
 
@@ -95,7 +95,7 @@ void DisplacementVotes::find_bins(const Features& query, const Features& place) 
   const float bin_px = static_cast<float>(query.working_size_px.width) / kBinsPerWidth;
   bins_.resize(matches_.size());
   std::transform(matches_.begin(), matches_.end(), bins_.begin(), [&](const Match& match) {
-    return bin_of(keypoint(query, match.query), keypoint(place, match.place), bin_px);
+    return bin_of(keypoint_of(query, match.query), keypoint_of(place, match.place), bin_px);
   });
 }
 
@@ -106,7 +106,7 @@ int DisplacementVotes::count(const Features& query, const Features& place, const
   counted_.clear();
   for (std::size_t i = 0; i < matches_.size(); ++i) {
     if (bins_[i] == kNoBin || !is_in_square(bins_[i], square)) continue;
-    const Keypoint& here = keypoint(query, matches_[i].query);
+    const Keypoint& here = keypoint_of(query, matches_[i].query);
     const bool is_new = std::none_of(counted_.begin(), counted_.end(), [&](const Keypoint& other) {
       const double dx = here.x_px - other.x_px;
       const double dy = here.y_px - other.y_px;

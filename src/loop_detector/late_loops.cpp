@@ -12,7 +12,7 @@ namespace {
 /// To be sure of a path in a map of some thousand steps takes some seventeen nats: log(N / 0.01)
 /// and log(49). A frame by night adds half a nat or more, so the frames of a path that became sure
 /// now are among the latest so many steps.
-constexpr std::size_t kMaxSteps = 32;
+constexpr std::size_t kWindowSteps = 32;
 /// A camera that stands still adds frames without end to a step.
 constexpr std::size_t kMaxFrames = 128;
 /// Below this a loop is more likely wrong than right.
@@ -124,7 +124,7 @@ void LateLoops::commit(Next next, bool is_step, const Found& found) noexcept {
 }
 
 void LateLoops::forget_oldest() {
-  if (steps_.size() > kMaxSteps) steps_.pop_front();
+  if (steps_.size() > kWindowSteps) steps_.pop_front();
   std::size_t frames = 0;
   for (const Step& step : steps_) frames += step.frames.size();
   if (frames <= kMaxFrames) return;
