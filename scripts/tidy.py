@@ -24,6 +24,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 
 TIDY = "clang-tidy-14"
+CLANG = "clang++-14"
 # The static analyzer takes as long as all other checks, and a minute for a large test.
 # performance-unnecessary-value-param takes 40 % of the remaining time, for the functions of system
 # headers. The other checks listed here take a quarter of it and find rare faults.
@@ -118,35 +119,46 @@ def files_with_faults(output):
     return set(re.findall(r"^(/.+?):\d+:\d+: (?:fatal )?(?:error|warning):", output, re.MULTILINE))
 
 
-def check_batch(sources, flags, pending, build):
+def check_batch(batch, pending, build):
     """As check(), of several sources together, with flags for all. Those in which that finds faults are
-    checked again by themselves, and so are those that cannot be compiled with the others because both
-    define the same name: a batch may show faults that they do not have."""
-    alone = []
-    while True:
-        result = subprocess.run([TIDY, "--quiet", *BATCHED, f"--config-file={ROOT}/.clang-tidy",
-                                 written(sources, build), "--", "-ferror-limit=0", *flags],
-                                capture_output=True, text=True)
-        faulty = files_with_faults(result.stdout) if result.returncode != 0 else set()
-        if result.returncode != 0 and not (faulty and faulty <= set(map(str, sources))):
-            return [result.stdout or result.stderr]  # a header's
-        alone += [source for source in sources if str(source) in faulty]
-        sources = [source for source in sources if str(source) not in faulty]
-        if not sources or "[clang-diagnostic-error]" not in result.stdout:
-            break
+    checked again by themselves: a batch may show some that they do not have."""
+    sources, flags = batch
+    result = subprocess.run([TIDY, "--quiet", *BATCHED, f"--config-file={ROOT}/.clang-tidy",
+                             written(sources, build), "--", *flags], capture_output=True, text=True)
+    faulty = files_with_faults(result.stdout) if result.returncode != 0 else set()
+    if result.returncode != 0 and not (faulty and faulty <= set(map(str, sources))):
+        return [result.stdout or result.stderr]  # a header's
     for source in sources:
-        pending[source].touch()
-    return [check(source, pending[source], flags, QUICK) for source in alone]
+        if str(source) not in faulty:
+            pending[source].touch()
+    return [check(source, pending[source], flags, QUICK) for source in sources if str(source) in faulty]
 
 
-def batches(todo):
-    """The sources whose flags are the same but for where headers come from, and the flags for them all."""
+def that_compile_together(sources, flags, build):
+    """Some of the sources. Two cannot be compiled as one if both define the same name."""
+    while len(sources) > 1:
+        result = subprocess.run([CLANG, "-fsyntax-only", "-ferror-limit=0", "-w",
+                                 written(sources, build), *flags], capture_output=True, text=True)
+        if result.returncode == 0:
+            break
+        faulty = files_with_faults(result.stderr)
+        good = [source for source in sources if str(source) not in faulty]
+        sources = good if 0 < len(good) < len(sources) else sources[:len(sources) // 2]
+    return sources
+
+
+def batches(todo, build):
+    """All sources, as many together as can be, and the flags for each lot."""
     by_others = {}
     for source, entry in todo.items():
         places, others = split_flags(entry)
         by_others.setdefault(others, {})[source] = places
     for others, places in by_others.items():
-        yield list(places), flags_of(places.values(), others)
+        while places:
+            flags = flags_of(places.values(), others)
+            batch = that_compile_together(list(places), flags, build)
+            yield batch, flags
+            places = {source: places[source] for source in places if source not in batch}
 
 
 def main():
@@ -197,7 +209,7 @@ def main():
             findings = list(pool.map(check_alone, todo))
         else:
             (build / "tidy_batches").mkdir(exist_ok=True)
-            found = pool.map(lambda batch: check_batch(*batch, pending, build), batches(todo))
+            found = pool.map(lambda batch: check_batch(batch, pending, build), batches(todo, build))
             findings = [finding for of_batch in found for finding in of_batch]
     print("".join(findings), end="")
     failed = sum(map(bool, findings))
