@@ -313,20 +313,25 @@ TwoViews views_through(const CameraModel& camera, Random& random, int num_right,
   const cv::Rect2d image({}, cv::Size2d(camera.size_px));
   cv::Matx33d turn;
   cv::Rodrigues(cv::Vec3d(0.05, 0.28, -0.03), turn);
+  // Each number by a statement of its own: compilers differ in the order of arguments.
   const auto noisy = [&](const cv::Vec2d& pixel) {
-    return cv::Point2d(pixel[0] + 0.3 * random.normal(), pixel[1] + 0.3 * random.normal());
+    const double y = pixel[1] + 0.3 * random.normal();
+    return cv::Point2d(pixel[0] + 0.3 * random.normal(), y);
   };
   while (static_cast<int>(views.matches.size()) < num_right) {
-    const cv::Vec3d point_m(10 * random.uniform() - 5, 10 * random.uniform() - 5,
-                            10 * random.uniform());
+    const double z_m = 10 * random.uniform();
+    const double y_m = 10 * random.uniform() - 5;
+    const cv::Vec3d point_m(10 * random.uniform() - 5, y_m, z_m);
     const auto a = project(camera, point_m);
     const auto b = project(camera, turn * (point_m - cv::Vec3d(0.8, -0.1, 0.4)));
     if (!a || !b || !image.contains(cv::Point2d(*a)) || !image.contains(cv::Point2d(*b))) continue;
-    views.add(noisy(*a), noisy(*b));
+    const cv::Point2d in_place = noisy(*b);
+    views.add(noisy(*a), in_place);
   }
   views.num_right = views.matches.size();
   for (int i = 0; i < num_random; ++i) {
-    const cv::Point2d in_place(random.uniform() * image.width, random.uniform() * image.height);
+    const double y_px = random.uniform() * image.height;
+    const cv::Point2d in_place(random.uniform() * image.width, y_px);
     views.add({random.uniform() * image.width, random.uniform() * image.height}, in_place);
   }
   return views;
@@ -340,7 +345,7 @@ TEST(EpipolarInliers, OfRaysFindNearlyAllRightMatchesThroughAnyLens) {
       const Matches inliers =
           epipolar_inliers(views.query, views.place, views.matches, kErrorPx, &camera);
       const int right = count_right(views, inliers);
-      EXPECT_GE(right, 54) << to_string(camera.lens) << ' ' << run;
+      EXPECT_GE(right, 57) << to_string(camera.lens) << ' ' << run;
       EXPECT_LE(static_cast<int>(inliers.size()) - right, 5)
           << to_string(camera.lens) << ' ' << run;
       EXPECT_EQ(epipolar_inliers(views.query, views.place, views.matches, kErrorPx, &camera),
