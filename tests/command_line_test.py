@@ -96,6 +96,8 @@ class CommandLineTest(CommandTest):
         self.assertEqual(ran.returncode, 0, ran.stderr)
         pose = json.loads(ran.stdout)["relative_pose"]
         self.assertEqual((pose["status"], pose["known"]), ("pure_rotation", "rotation"))  # the same image
+        masked = loopbit("query", town, first, "--camera", camera, "--mask", self.mask(dark_rows=80), "--json")
+        self.assertLess(json.loads(masked.stdout)["relative_pose"]["matches"], pose["matches"])
         for row in range(4):
             for column in range(4):
                 self.assertAlmostEqual(pose["T_match_query"][row][column], float(row == column), places=3)

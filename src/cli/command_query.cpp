@@ -158,7 +158,10 @@ class Relocalizer {
         map_(std::make_shared<MapReader>(flags.map, flags.map_cache_mb)),
         detector_(detector_options(*map_, flags), map_),
         surf_(detector_.options().surf) {
-    if (!flags.mask.empty()) detector_.set_mask(read_mask(flags.mask));
+    if (!flags.mask.empty()) {
+      mask_ = read_mask(flags.mask);
+      detector_.set_mask(mask_);
+    }
     if (!flags.camera.empty()) camera_ = read_camera(flags.camera);
     // As in a run: through other lenses it finds no more than without.
     if (camera_ && camera_->lens == Lens::equidistant) detector_.set_camera(camera_);
@@ -216,7 +219,7 @@ class Relocalizer {
   /// None if the place is of images of another size.
   std::optional<RelativePose> pose_of(const Frame& frame, const RankedPlace& place) {
     Features query;
-    surf_.extract(gray_image(frame.image), query);
+    surf_.extract(gray_image(frame.image), query, mask_);
     const Features match = detector_.features_of(place.place);
     if (query.working_size_px != match.working_size_px) return std::nullopt;
     return estimator_.estimate({.query = {&query, &*camera_}, .match = {&match, &*camera_}});
@@ -225,6 +228,7 @@ class Relocalizer {
   const QueryFlags& flags_;
   std::shared_ptr<MapReader> map_;
   LoopDetector detector_;
+  cv::Mat1b mask_;  ///< empty = none
   std::optional<CameraModel> camera_;
   SurfExtractor surf_;
   RelativePoseEstimator estimator_;
