@@ -59,7 +59,9 @@ void redirect(int stream, const char* file, int flags) {
   for (std::size_t i = arguments; i < request.size(); ++i) argv.push_back(request[i].data());
   const int count = static_cast<int>(argv.size());
   argv.push_back(nullptr);
-  std::exit(__real_main(count, argv.data()));
+  const int code = __real_main(count, argv.data());
+  std::fflush(nullptr);
+  _exit(code);  // 246 libraries have much to tidy up
 }
 
 }  // namespace
