@@ -16,6 +16,7 @@
 #include "loopbit/map_tools.hpp"
 
 #include "batch_writer.hpp"
+#include "file_database.hpp"
 #include "map_schema.hpp"
 #include "map_support.hpp"
 #include "test_support.hpp"
@@ -138,7 +139,8 @@ TEST_F(MapThreads, PendingFeaturesAreGivenWhileTheyAreCommitted) {
   const std::string map_path = path("map.db");
   loopbit::MapSession session;
   session.session = 1;
-  BatchWriter writer(open_map_for_writing(map_path), std::move(session), 1, {});
+  BatchWriter writer(std::make_unique<FileDatabase>(open_map_for_writing(map_path)),
+                     std::move(session), 1, {});
   std::vector<std::shared_ptr<const Features>> added;
   int pending = 0;
   for (int frame = 0; frame < kFrames; ++frame) {

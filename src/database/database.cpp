@@ -167,11 +167,6 @@ bool Statement::is_null(int column) const {
   return sqlite3_column_type(statement_.get(), column) == SQLITE_NULL;
 }
 
-std::string Statement::text(int column) const {
-  const auto characters = bytes(column);
-  return {characters.begin(), characters.end()};
-}
-
 std::span<const unsigned char> Statement::bytes(int column) const {
   const auto* data =
       static_cast<const unsigned char*>(sqlite3_column_blob(statement_.get(), column));

@@ -7,9 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "map_log.hpp"
-#include "map_schema.hpp"
-
 namespace loopbit {
 namespace {
 
@@ -20,8 +17,8 @@ constexpr std::size_t kMaxPendingFrames = 256;
 
 }  // namespace
 
-BatchWriter::BatchWriter(Database database, MapSession session, std::int64_t first_place,
-                         EncodeImage encode_image)
+BatchWriter::BatchWriter(std::unique_ptr<MapDatabase> database, MapSession session,
+                         std::int64_t first_place, EncodeImage encode_image)
     : database_(std::move(database)),
       session_(std::move(session)),
       first_place_(first_place),
@@ -45,7 +42,7 @@ void BatchWriter::add(AddedFrame frame) {
   if (pending_.size() == 1 || pending_.size() >= kFramesPerBatch) added_.notify_all();
 }
 
-void BatchWriter::change(std::function<void(const Database&)> change) {
+void BatchWriter::change(std::function<void(const MapDatabase&)> change) {
   const std::lock_guard lock(mutex_);
   if (error_) std::rethrow_exception(error_);
   changes_.push_back(std::move(change));
@@ -77,7 +74,7 @@ std::int64_t BatchWriter::saved_frames() const {
 
 void BatchWriter::close() {
   rows_.reset();
-  close_log(*database_);
+  database_->close();
   database_.reset();
 }
 
@@ -115,7 +112,7 @@ void BatchWriter::commit_batches() {
 }
 
 void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& changes) {
-  Commit commit(*database_);
+  const auto transaction = database_->begin();
   if (!rows_) rows_.emplace(*database_);
   if (!batch.empty()) {
     if (session_.frames == 0) rows_->write_linked(session_.session);
@@ -124,7 +121,7 @@ void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& ch
   }
   for (const AddedFrame& frame : batch) write(frame);
   for (const auto& change : changes) change(*database_);
-  commit.end();
+  transaction->end();
 }
 
 void BatchWriter::write(const AddedFrame& frame) {

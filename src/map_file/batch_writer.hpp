@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "loopbit/database.hpp"
+#include "loopbit/map_database.hpp"
 #include "loopbit/map_file.hpp"
 
 #include "map_rows.hpp"
@@ -33,7 +33,7 @@ struct AddedFrame {
 class BatchWriter {
  public:
   /// `encode_image` may be empty.
-  BatchWriter(Database database, MapSession session, std::int64_t first_place,
+  BatchWriter(std::unique_ptr<MapDatabase> database, MapSession session, std::int64_t first_place,
               EncodeImage encode_image);
   /// Drops uncommitted frames.
   ~BatchWriter();
@@ -46,7 +46,7 @@ class BatchWriter {
   void add(AddedFrame frame);
 
   /// Makes `change` part of a commit, after all frames that were added so far.
-  void change(std::function<void(const Database&)> change);
+  void change(std::function<void(const MapDatabase&)> change);
 
   /// Waits until all is committed. Throws the Error if it cannot be.
   void flush();
@@ -61,13 +61,13 @@ class BatchWriter {
   void close();
 
  private:
-  using Changes = std::vector<std::function<void(const Database&)>>;
+  using Changes = std::vector<std::function<void(const MapDatabase&)>>;
 
   void commit_batches();
   void commit(const std::vector<AddedFrame>& batch, const Changes& changes);
   void write(const AddedFrame& frame);
 
-  std::optional<Database> database_;
+  std::unique_ptr<MapDatabase> database_;
   std::optional<RowWriter> rows_;  ///< from the first commit on: an older map lacks tables
   MapSession session_;             ///< session_.frames are committed; for the thread only
   std::int64_t first_place_;

@@ -10,8 +10,8 @@
 
 #include "loopbit/map_tools.hpp"
 
+#include "file_database.hpp"
 #include "map_rows.hpp"
-#include "map_schema.hpp"
 
 namespace loopbit {
 namespace {
@@ -20,7 +20,7 @@ namespace {
 std::vector<std::int64_t> listed_images(const std::string& path, Damage& damage) {
   std::vector<std::int64_t> places;
   for_each_image(
-      open_map_for_reading(path),
+      *open_map_to_read(path),
       [&](std::int64_t place, std::int64_t /*bytes*/) { places.push_back(place); }, damage);
   return places;
 }

@@ -27,6 +27,7 @@
 #include "loopbit/map_tools.hpp"
 #include "loopbit/write_file.hpp"
 
+#include "file_database.hpp"
 #include "map_log.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
@@ -44,7 +45,7 @@ constexpr std::int64_t kPlacesPerTransaction = 2048;
 class MapCopy {
  public:
   /// `numbers`: the number in `to` of each session that is copied.
-  MapCopy(const Database& to, std::map<int, int> numbers)
+  MapCopy(const MapDatabase& to, std::map<int, int> numbers)
       : rows_(to), numbers_(std::move(numbers)) {}
 
   void copy_session(MapSession session) {
@@ -95,12 +96,12 @@ struct CopyPlan {
 
 /// Copies the planned rows under the same numbers to a new map that nobody can see yet. Returns the
 /// counts of copied rows.
-MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
+MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const MapDatabase& to) {
   std::map<int, int> numbers;
   for (const MapSession& session : plan.sessions) numbers[session.session] = session.session;
   MapCopy copy(to, std::move(numbers));
   MapCheck counts;
-  std::optional<Commit> commit(std::in_place, to);
+  auto transaction = to.begin();
   for (const MapSession& session : plan.sessions) copy.copy_session(session);
   counts.sessions = static_cast<std::int64_t>(plan.sessions.size());
   from.for_each_place([&](const MapPlace& place) {
@@ -112,13 +113,14 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const Database& to) {
       return;
     counts.images += image.has_value();
     if (++counts.places % kPlacesPerTransaction == 0) {
-      commit->end();
-      commit.emplace(to);
+      transaction->end();
+      transaction.reset();
+      transaction = to.begin();
     }
   });
   for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);
   for (const MapLoop& loop : from.rejected_loops()) copy.copy_rejected(loop);
-  commit->end();
+  transaction->end();
   return counts;
 }
 
@@ -132,7 +134,7 @@ struct MergePlan {
 };
 
 /// Throws Error (kind option) if settings differ.
-MergePlan plan_of(const std::string& into, const Database& to, const MapReader& source) {
+MergePlan plan_of(const MapDatabase& to, const MapReader& source) {
   Damage damage;
   std::map<std::string, int> known;
   std::string options;
@@ -140,22 +142,24 @@ MergePlan plan_of(const std::string& into, const Database& to, const MapReader& 
     known[session.uid] = session.session;
     options = session.options;
   }
-  refuse_damaged(into, damage.clauses());  // a session with an unknown uid could be added twice
+  refuse_damaged(to.path(),
+                 damage.clauses());  // a session with an unknown uid could be added twice
   MergePlan plan;
-  int next = next_session(to);
   for (const MapSession& session : source.sessions()) {
     if (options.empty()) options = session.options;
-    check_same_shape(into, options, options_of_shape(source.path(), session.options));
-    const auto found = known.find(session.uid);
-    const bool is_known = found != known.end();
-    plan.numbers[session.session] = is_known ? found->second : next++;
-    if (is_known) {
+    check_same_shape(to.path(), options, options_of_shape(source.path(), session.options));
+    if (const auto found = known.find(session.uid); found != known.end()) {
+      plan.numbers[session.session] = found->second;
       ++plan.known;
     } else {
       plan.added.push_back(session);
       // Those of `into` that come before it now are new to it.
       if (!known.empty()) plan.added.back().linked = false;
     }
+  }
+  const std::vector<int> numbers = to.new_sessions(plan.added.size());
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    plan.numbers[plan.added[i].session] = numbers[i];
   }
   return plan;
 }
@@ -169,26 +173,24 @@ void refuse_unfinished(const std::string& from) {
 }
 
 /// Adds the sessions of `source` that `into` lacks, in one transaction.
-MergeCounts merge(const std::string& into, const Database& to, MapReader& source) {
-  const MergePlan plan = plan_of(into, to, source);
+MergeCounts merge(const MapDatabase& to, MapReader& source) {
+  const MergePlan plan = plan_of(to, source);
   std::set<int> added;
   for (const MapSession& session : plan.added) added.insert(session.session);
 
   MergeCounts counts{.sessions = static_cast<std::int64_t>(added.size()), .known = plan.known};
-  if (!has_log(to)) {  // otherwise readers would wait for the whole commit
-    mark(to);
-    begin_log(to);
-  }
-  Commit commit(to);
+  to.prepare_long_transaction();
+  const auto transaction = to.begin();
   MapCopy copy(to, plan.numbers);
-  std::int64_t id = next_place(to);
+  std::int64_t id = 0;
   for (const MapSession& session : plan.added) copy.copy_session(session);
   source.for_each_place([&](const MapPlace& place) {
     if (!added.contains(place.at.session)) return;
     const auto features = source.features_of(place);
     if (!features) return;
     MapPlace copied = place;
-    copied.id = id++;
+    id = to.place_key({plan.numbers.at(place.at.session), place.at.frame}, id);
+    copied.id = id;
     counts.places += copy.copy_place(copied, *features,
                                      source.image_of(place).value_or(std::vector<unsigned char>{}));
   });
@@ -199,7 +201,7 @@ MergeCounts merge(const std::string& into, const Database& to, MapReader& source
     if (added.contains(loop.query.session)) copy.copy_rejected(loop);
   }
   refuse_damaged(source.path(), source.damage());
-  commit.end();
+  transaction->end();
   return counts;
 }
 
@@ -276,10 +278,10 @@ class RepairedCopy {
 MapCheck copy_to_new(MapReader& source, const std::string& to) {
   const CopyPlan plan{.sessions = all_sessions(source),
                       .keeps_place = [](const MapPlace&) { return true; }};
-  const Database database = open_map_for_writing(to);
+  FileDatabase database(open_map_for_writing(to));
   MapCheck counts = copy_whole(source, plan, database);
   counts.damage = source.damage();
-  close_log(database);
+  database.close();
   return counts;
 }
 
@@ -292,7 +294,7 @@ bool has_whole_image(const std::string& path) {
 
 /// Whether `linked` and `rejected` begin where a map of the newest version has them.
 bool has_whole_links(const std::string& path) {
-  const Database database = open_map_for_reading(path);
+  const FileDatabase database(open_map_for_reading(path));
   Damage damage;
   (void)read_rejected_loops(database, damage);
   const std::size_t before = damage.clauses().size();
@@ -401,11 +403,11 @@ void write_compact(const Database& old, const std::string& part, const CompactOp
   plan.keeps_place = [&](const MapPlace& place) { return kept.contains(place.id); };
   map.for_each_place([&](const MapPlace&) { ++counts.places_before; });
   make_alike(part, old.path());
-  const Database compact = open_map_for_writing(part);
+  FileDatabase compact(open_map_for_writing(part));
   counts.places_after = copy_whole(map, plan, compact).places;
   refuse_damaged(map.path(), map.damage());
-  keep_sequences(old, compact);
-  close_log(compact);
+  keep_sequences(old, compact.file());
+  compact.close();
 }
 
 /// A log beside the old file would be taken for that of the new one.
@@ -424,15 +426,15 @@ void check_unused(const Database& old) {
 MergeCounts merge_map(const std::string& into, const std::string& from) {
   auto source = std::make_unique<MapReader>(from);
   refuse_unfinished(from);
-  const Database to = open_map_for_writing(into);
+  const auto to = open_map_to_write(into);
   try {
-    const MergeCounts counts = merge(into, to, *source);
+    const MergeCounts counts = merge(*to, *source);
     source.reset();  // it may read the same map
-    close_log(to);
+    to->close();
     return counts;
   } catch (const Error&) {
     source.reset();
-    close_log(to);
+    to->close();
     throw;
   }
 }

@@ -12,16 +12,14 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "loopbit/database.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/picture.hpp"
 #include "loopbit/version.hpp"
 
 #include "batch_writer.hpp"
-#include "map_log.hpp"
+#include "file_database.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
-#include "map_schema.hpp"
 #include "stored_features.hpp"
 
 namespace loopbit {
@@ -50,16 +48,16 @@ std::string now_utc() {
 struct MapReader::Impl {
   Impl(const std::string& map_path, std::size_t cache_mb)
       : path(map_path),
-        database(open_map_for_reading(map_path)),
-        features(database),
-        images(database),
-        stored(database, cache_mb),
-        sessions(read_sessions(database, damage)) {
-    if (const std::string fault = header_fault(database); !fault.empty()) damage.add(fault);
+        database(open_map_to_read(map_path)),
+        features(*database),
+        images(*database),
+        stored(*database, cache_mb),
+        sessions(read_sessions(*database, damage)) {
+    if (const std::string fault = database->fault(); !fault.empty()) damage.add(fault);
   }
 
   std::string path;
-  Database database;
+  std::unique_ptr<MapDatabase> database;
   FeatureReader features;
   ImageReader images;
   StoredFeatures stored;  ///< of the places that for_each_earlier_place() visited
@@ -85,13 +83,13 @@ LoopDetectorOptions MapReader::options() const {
 }
 
 void MapReader::for_each_place(const VisitPlace& visit) {
-  loopbit::for_each_place(impl_->database, visit, impl_->damage);
+  loopbit::for_each_place(*impl_->database, visit, impl_->damage);
 }
 
-std::vector<MapLoop> MapReader::loops() { return read_loops(impl_->database, impl_->damage); }
+std::vector<MapLoop> MapReader::loops() { return read_loops(*impl_->database, impl_->damage); }
 
 std::vector<MapLoop> MapReader::rejected_loops() {
-  return read_rejected_loops(impl_->database, impl_->damage);
+  return read_rejected_loops(*impl_->database, impl_->damage);
 }
 
 std::optional<Features> MapReader::features_of(const MapPlace& place) {
@@ -101,7 +99,7 @@ std::optional<Features> MapReader::features_of(const MapPlace& place) {
 MapImages MapReader::images() {
   MapImages images;
   for_each_image(
-      impl_->database,
+      *impl_->database,
       [&](std::int64_t /*place*/, std::int64_t bytes) {
         ++images.number;
         images.bytes += bytes;
@@ -115,14 +113,7 @@ std::optional<std::vector<unsigned char>> MapReader::image_of(const MapPlace& pl
 }
 
 std::vector<std::string> MapReader::check_structure() const {
-  std::vector<std::string> faults;
-  Statement rows(impl_->database, "PRAGMA integrity_check");
-  Statement::Step step = rows.step_if_readable();
-  for (; step == Statement::Step::row; step = rows.step_if_readable()) {
-    if (rows.text(0) != "ok") faults.push_back(rows.text(0));
-  }
-  if (step == Statement::Step::damaged) faults.emplace_back("the file cannot be read to its end");
-  return faults;
+  return impl_->database->structure_faults();
 }
 
 void MapReader::check_options(const LoopDetectorOptions& options) {
@@ -238,7 +229,7 @@ class MapWriter::Impl {
   void remove(PlaceId place) {
     const std::int64_t id = stored().remove(place);
     if (id == StoredFeatures::kNoRow) return;
-    writer_->change([id](const Database& database) { remove_place(database, id); });
+    writer_->change([id](const MapDatabase& database) { remove_place(database, id); });
   }
 
   void reject(SessionFrame query, SessionFrame match) {
@@ -251,7 +242,7 @@ class MapWriter::Impl {
                                                  path_, at->session));
     }
     writer_->change(
-        [query, match](const Database& database) { reject_loop(database, query, match); });
+        [query, match](const MapDatabase& database) { reject_loop(database, query, match); });
   }
 
   [[nodiscard]] int session() const { return session_; }
@@ -261,15 +252,15 @@ class MapWriter::Impl {
  private:
   std::unique_ptr<BatchWriter> begin_session(const std::string& name, EncodeImage encode_image,
                                              std::size_t cache_mb) {
-    Database database = open_map_for_writing(path_);
-    for (const MapSession& session : read_sessions(database, damage_)) {
+    std::unique_ptr<MapDatabase> database = open_map_to_write(path_);
+    for (const MapSession& session : read_sessions(*database, damage_)) {
       check_same_shape(path_, session.options, options_);
       sessions_.insert(session.session);
     }
-    database_.emplace(open_map_for_reading(path_));
+    database_ = open_map_to_read(path_);
     stored_.emplace(*database_, cache_mb);
-    session_ = next_session(database);
-    first_place_ = next_place(database);
+    session_ = database->new_sessions(1).front();
+    first_place_ = database->place_key({session_, 0}, 0);
     MapSession session{.session = session_,
                        .uid = new_uid(),
                        .name = name,
@@ -300,8 +291,8 @@ class MapWriter::Impl {
   std::set<int> sessions_;  ///< earlier ones
   int session_ = 0;
   std::int64_t first_place_ = 0;
-  PlaceId frames_ = 0;                ///< of this session
-  std::optional<Database> database_;  ///< for reading; gone after finish()
+  PlaceId frames_ = 0;                     ///< of this session
+  std::unique_ptr<MapDatabase> database_;  ///< for reading; gone after finish()
   std::optional<StoredFeatures> stored_;
   Damage damage_;
   std::unique_ptr<BatchWriter> writer_;

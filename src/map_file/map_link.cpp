@@ -17,10 +17,9 @@
 #include "loopbit/map_tools.hpp"
 #include "loopbit/version.hpp"
 
-#include "map_log.hpp"
+#include "file_database.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
-#include "map_schema.hpp"
 #include "stored_features.hpp"
 
 namespace loopbit {
@@ -30,7 +29,7 @@ namespace {
 constexpr std::int64_t kMaxSkipped = 1000;
 
 /// The places of a session in order of frame.
-std::vector<MapPlace> places_of(const Database& database, int session, Damage& damage) {
+std::vector<MapPlace> places_of(const MapDatabase& database, int session, Damage& damage) {
   std::vector<MapPlace> places;
   for_each_place(
       database,
@@ -46,7 +45,7 @@ std::vector<MapPlace> places_of(const Database& database, int session, Damage& d
 /// A map as it was for the detector of one of its sessions, whose frames are processed again.
 class MapBefore : public MapStorage {
  public:
-  MapBefore(std::string path, const Database& database, int session)
+  MapBefore(std::string path, const MapDatabase& database, int session)
       : path_(std::move(path)),
         database_(database),
         session_(session),
@@ -93,7 +92,7 @@ class MapBefore : public MapStorage {
 
  private:
   std::string path_;
-  const Database& database_;
+  const MapDatabase& database_;
   int session_;
   StoredFeatures stored_;
   const MapPlace* next_ = nullptr;
@@ -121,7 +120,7 @@ class FramePairs {
 class Relived {
  public:
   /// `database` must outlive it.
-  Relived(const std::string& path, const Database& database, int session,
+  Relived(const std::string& path, const MapDatabase& database, int session,
           const LoopDetectorOptions& options)
       : path_(path),
         session_(session),
@@ -202,10 +201,10 @@ template <typename Progress>
 std::optional<std::vector<MapLoop>> new_loops_of(const MapSession& session, const std::string& path,
                                                  const LoopDetectorOptions& options,
                                                  const Progress& progress) {
-  const Database database = open_map_for_reading(path);
-  Relived relived(path, database, session.session, options);
+  const auto database = open_map_to_read(path);
+  Relived relived(path, *database, session.session, options);
   Damage damage;
-  const std::vector<MapPlace> places = places_of(database, session.session, damage);
+  const std::vector<MapPlace> places = places_of(*database, session.session, damage);
   refuse_damaged(path, damage.clauses());
   std::vector<MapLoop> found;
   for (const MapPlace& place : places) {
@@ -222,16 +221,16 @@ LoopDetectorOptions options_of(const std::string& path, const MapSession& sessio
   return options_from_json(session.options, fmt::format("'{}'", path));
 }
 
-void write_link(const Database& database, int session, const std::vector<MapLoop>& loops) {
-  Commit commit(database);
+void write_link(const MapDatabase& database, int session, const std::vector<MapLoop>& loops) {
+  const auto transaction = database.begin();
   RowWriter rows(database);
   for (const MapLoop& loop : loops) rows.write(loop);
   rows.write_linked(session);
-  commit.end();
+  transaction->end();
 }
 
 /// The sessions that are not linked.
-std::vector<MapSession> unlinked_sessions(const std::string& path, const Database& database,
+std::vector<MapSession> unlinked_sessions(const std::string& path, const MapDatabase& database,
                                           const std::optional<LoopDetectorOptions>& options) {
   Damage damage;
   std::vector<MapSession> sessions = read_sessions(database, damage);
@@ -244,16 +243,18 @@ std::vector<MapSession> unlinked_sessions(const std::string& path, const Databas
   return sessions;
 }
 
-std::int64_t num_places(const Database& database, const std::vector<MapSession>& sessions) {
+std::int64_t num_places(const MapDatabase& database, const std::vector<MapSession>& sessions) {
   std::int64_t number = 0;
+  const auto count = database.prepare("SELECT count(*) FROM place WHERE session = ?1");
   for (const MapSession& session : sessions) {
-    number += database.integer(
-        fmt::format("SELECT count(*) FROM place WHERE session = {}", session.session));
+    count->bind(1, std::int64_t{session.session});
+    if (count->step()) number += count->integer(0);
+    count->reset();
   }
   return number;
 }
 
-LinkCounts link(const std::string& path, const Database& database,
+LinkCounts link(const std::string& path, const MapDatabase& database,
                 const std::optional<LoopDetectorOptions>& options,
                 const std::function<bool(const LinkCounts&)>& progress) {
   const std::vector<MapSession> sessions = unlinked_sessions(path, database, options);
@@ -279,14 +280,14 @@ LinkCounts link(const std::string& path, const Database& database,
 
 LinkCounts link_map(const std::string& path, const std::optional<LoopDetectorOptions>& options,
                     const std::function<bool(const LinkCounts&)>& progress) {
-  (void)open_map_for_reading(path);  // it must exist
-  const Database database = open_map_for_writing(path);
+  (void)open_map_to_read(path);  // it must exist
+  const auto database = open_map_to_write(path);
   try {
-    const LinkCounts counts = link(path, database, options, progress);
-    close_log(database);
+    const LinkCounts counts = link(path, *database, options, progress);
+    database->close();
     return counts;
   } catch (...) {
-    close_log(database);
+    database->close();
     throw;
   }
 }

@@ -152,18 +152,19 @@ constexpr std::int64_t kProbesPerStep = 10;
 /// Calls visit(row, key) for each row of `table` that can be read, in order of its key, which is
 /// the first of `columns`.
 template <typename Visit>
-void for_each_row(const Database& database, const std::string& table, const std::string& columns,
+void for_each_row(const MapDatabase& database, const std::string& table, const std::string& columns,
                   Damage& damage, const Visit& visit) {
   const std::string key = columns.substr(0, columns.find(','));
-  Statement rows(database, fmt::format("SELECT {} FROM {} WHERE {} >= ?1 ORDER BY {}", columns,
-                                       table, key, key));
+  const auto statement = database.prepare(
+      fmt::format("SELECT {} FROM {} WHERE {} >= ?1 ORDER BY {}", columns, table, key, key));
+  SqlStatement& rows = *statement;
   std::int64_t next = 1;
   std::int64_t damaged_from = 0;  // 0: not in a damaged range
   for (std::int64_t probes = 0; probes < kMaxProbes;) {
     rows.reset();
     rows.bind(1, next);
-    Statement::Step step = rows.step_if_readable();
-    for (; step == Statement::Step::row; step = rows.step_if_readable()) {
+    SqlStatement::Step step = rows.step_if_readable();
+    for (; step == SqlStatement::Step::row; step = rows.step_if_readable()) {
       const std::int64_t at = rows.integer(0);
       if (at < next || at == std::numeric_limits<std::int64_t>::max()) break;  // out of order
       if (damaged_from > 0) {
@@ -174,7 +175,7 @@ void for_each_row(const Database& database, const std::string& table, const std:
       visit(rows, at);
       next = at + 1;
     }
-    if (step == Statement::Step::end) {
+    if (step == SqlStatement::Step::end) {
       if (damaged_from == 0) return;
       break;
     }
@@ -185,7 +186,7 @@ void for_each_row(const Database& database, const std::string& table, const std:
   damage.add(fmt::format("{} {} and after: the file cannot be read", table, damaged_from));
 }
 
-bool has_checksum(const Statement& row, int column, const Checksum& checksum) {
+bool has_checksum(const SqlStatement& row, int column, const Checksum& checksum) {
   return row.integer(column) == checksum.value();
 }
 
@@ -243,12 +244,12 @@ int narrow(std::int64_t value) {
   return value >= 0 && value <= std::numeric_limits<int>::max() ? static_cast<int>(value) : -1;
 }
 
-SessionFrame session_frame(const Statement& row, int column) {
+SessionFrame session_frame(const SqlStatement& row, int column) {
   return {narrow(row.integer(column)), narrow(row.integer(column + 1))};
 }
 
 /// The rows of `loop` or `rejected`.
-std::vector<MapLoop> read_loops_of(const Database& database, const std::string& table,
+std::vector<MapLoop> read_loops_of(const MapDatabase& database, const std::string& table,
                                    Checksum (*checksum)(const MapLoop&), Damage& damage) {
   std::vector<MapLoop> loops;
   for_each_row(
@@ -256,7 +257,7 @@ std::vector<MapLoop> read_loops_of(const Database& database, const std::string& 
       table +
           ", session, frame, match_session, match_frame, score, similarity, matches, "
           "inliers, checksum",
-      damage, [&](const Statement& row, std::int64_t key) {
+      damage, [&](const SqlStatement& row, std::int64_t key) {
         const MapLoop loop{.query = session_frame(row, 1),
                            .match = session_frame(row, 3),
                            .score = row.real(5),
@@ -272,7 +273,15 @@ std::vector<MapLoop> read_loops_of(const Database& database, const std::string& 
   return loops;
 }
 
-void write_loop(Statement& row, const MapLoop& loop, const Checksum& checksum) {
+/// `table`: loop or rejected.
+std::string insertion_of_loop(const std::string& table) {
+  return fmt::format(
+      "INSERT INTO {} (session, frame, match_session, match_frame, score, similarity, matches, "
+      "inliers, checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
+      table);
+}
+
+void write_loop(SqlStatement& row, const MapLoop& loop, const Checksum& checksum) {
   row.bind(1, std::int64_t{loop.query.session});
   row.bind(2, std::int64_t{loop.query.frame});
   row.bind(3, std::int64_t{loop.match.session});
@@ -286,12 +295,12 @@ void write_loop(Statement& row, const MapLoop& loop, const Checksum& checksum) {
   row.reset();
 }
 
-void mark_linked(const Database& database, std::vector<MapSession>& sessions, Damage& damage) {
+void mark_linked(const MapDatabase& database, std::vector<MapSession>& sessions, Damage& damage) {
   if (sessions.empty()) return;
   sessions.front().linked = true;  // to none
   if (!has_links(database)) return;
   for_each_row(database, "linked", "session, checksum", damage,
-               [&](const Statement& row, std::int64_t key) {
+               [&](const SqlStatement& row, std::int64_t key) {
                  if (!has_checksum(row, 1, checksum_of_linked(narrow(key)))) {
                    damage.add(fmt::format("linked {}: its value differs from its checksum", key));
                    return;
@@ -314,11 +323,11 @@ void refuse_damaged(const std::string& path, const std::vector<std::string>& cla
                   path, clauses.front(), more > 0 ? fmt::format(", and {} more", more) : ""));
 }
 
-std::vector<MapSession> read_sessions(const Database& database, Damage& damage) {
+std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damage) {
   std::vector<MapSession> sessions;
   for_each_row(
       database, "session", "session, uid, name, started, loopbit, options, frames, checksum",
-      damage, [&](const Statement& row, std::int64_t key) {
+      damage, [&](const SqlStatement& row, std::int64_t key) {
         MapSession session{.session = narrow(key),
                            .uid = row.text(1),
                            .name = row.text(2),
@@ -336,12 +345,12 @@ std::vector<MapSession> read_sessions(const Database& database, Damage& damage) 
   return sessions;
 }
 
-void for_each_place(const Database& database, const std::function<void(const MapPlace&)>& visit,
+void for_each_place(const MapDatabase& database, const std::function<void(const MapPlace&)>& visit,
                     Damage& damage) {
   MapPlace place;
   for_each_row(
       database, "place", "place, session, frame, timestamp, content, checksum", damage,
-      [&](const Statement& row, std::int64_t key) {
+      [&](const SqlStatement& row, std::int64_t key) {
         place.id = key;
         place.at = session_frame(row, 1);
         place.timestamp_s.reset();
@@ -354,12 +363,12 @@ void for_each_place(const Database& database, const std::function<void(const Map
       });
 }
 
-std::vector<MapLoop> read_loops(const Database& database, Damage& damage) {
+std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage) {
   return read_loops_of(
       database, "loop", [](const MapLoop& loop) { return checksum_of(loop); }, damage);
 }
 
-std::vector<MapLoop> read_rejected_loops(const Database& database, Damage& damage) {
+std::vector<MapLoop> read_rejected_loops(const MapDatabase& database, Damage& damage) {
   if (!has_links(database)) return {};
   return read_loops_of(database, "rejected", checksum_of_rejected, damage);
 }
@@ -381,19 +390,19 @@ MapLoop loop_of(const LateLoop& loop, int session) {
           .similarity = loop.similarity};
 }
 
-FeatureReader::FeatureReader(const Database& database)
-    : row_(database, "SELECT features, checksum FROM features WHERE place = ?1") {}
+FeatureReader::FeatureReader(const MapDatabase& database)
+    : row_(database.prepare("SELECT features, checksum FROM features WHERE place = ?1")) {}
 
 std::optional<Features> FeatureReader::read(std::int64_t place, const SessionFrame& at,
                                             Damage& damage) {
-  row_.reset();
-  row_.bind(1, place);
+  row_->reset();
+  row_->bind(1, place);
   std::optional<Features> features;
-  if (row_.step_if_readable() == Statement::Step::row) {
-    const auto bytes = row_.bytes(0);
-    if (has_checksum(row_, 1, checksum_of(at).add(bytes))) features = features_from(bytes);
+  if (row_->step_if_readable() == SqlStatement::Step::row) {
+    const auto bytes = row_->bytes(0);
+    if (has_checksum(*row_, 1, checksum_of(at).add(bytes))) features = features_from(bytes);
   }
-  row_.reset();  // ends the read, so that the log can be emptied
+  row_->reset();  // ends the read, so that the log can be emptied
   if (!features) {
     damage.add(
         fmt::format("place {} (session {}, frame {}): its features are missing or "
@@ -403,16 +412,16 @@ std::optional<Features> FeatureReader::read(std::int64_t place, const SessionFra
   return features;
 }
 
-void for_each_image(const Database& database,
+void for_each_image(const MapDatabase& database,
                     const std::function<void(std::int64_t, std::int64_t)>& visit, Damage& damage) {
   if (!has_images(database)) return;
   for_each_row(database, "image", "place, length(image)", damage,
-               [&](const Statement& row, std::int64_t place) { visit(place, row.integer(1)); });
+               [&](const SqlStatement& row, std::int64_t place) { visit(place, row.integer(1)); });
 }
 
-ImageReader::ImageReader(const Database& database) {
+ImageReader::ImageReader(const MapDatabase& database) {
   if (!has_images(database)) return;
-  row_.emplace(database, "SELECT image, checksum FROM image WHERE place = ?1");
+  row_ = database.prepare("SELECT image, checksum FROM image WHERE place = ?1");
 }
 
 std::optional<std::vector<unsigned char>> ImageReader::read(std::int64_t place,
@@ -421,121 +430,121 @@ std::optional<std::vector<unsigned char>> ImageReader::read(std::int64_t place,
   if (!row_) return std::nullopt;
   row_->reset();
   row_->bind(1, place);
-  const Statement::Step step = row_->step_if_readable();
+  const SqlStatement::Step step = row_->step_if_readable();
   std::optional<std::vector<unsigned char>> image;
-  if (step == Statement::Step::row) {
+  if (step == SqlStatement::Step::row) {
     const auto bytes = row_->bytes(0);
     if (has_checksum(*row_, 1, checksum_of_image(bytes, at))) {
       image.emplace(bytes.begin(), bytes.end());
     }
   }
   row_->reset();  // ends the read, so that the log can be emptied
-  if (!image && step != Statement::Step::end) {
+  if (!image && step != SqlStatement::Step::end) {
     damage.add(fmt::format("place {} (session {}, frame {}): its image differs from its checksum",
                            place, at.session, at.frame));
   }
   return image;
 }
 
-RowWriter::RowWriter(const Database& database)
-    : session_(database,
-               "INSERT INTO session VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (session) "
-               "DO UPDATE SET frames = ?7, checksum = ?8"),
-      linked_(database, "INSERT OR REPLACE INTO linked VALUES (?1, ?2)"),
-      place_(database, "INSERT INTO place VALUES (?1, ?2, ?3, ?4, ?5, ?6)"),
-      features_(database, "INSERT INTO features VALUES (?1, ?2, ?3)"),
-      image_(database, "INSERT INTO image VALUES (?1, ?2, ?3)"),
-      loop_(database, "INSERT INTO loop VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)"),
-      rejected_(database,
-                "INSERT INTO rejected VALUES (NULL, ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)") {}
+RowWriter::RowWriter(const MapDatabase& database)
+    : session_(database.prepare(
+          "INSERT INTO session (session, uid, name, started, loopbit, options, frames, checksum) "
+          "VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8) ON CONFLICT (session) DO UPDATE SET frames = "
+          "?7, checksum = ?8")),
+      linked_(database.prepare("INSERT INTO linked (session, checksum) VALUES (?1, ?2) ON CONFLICT "
+                               "(session) DO UPDATE SET checksum = ?2")),
+      place_(database.prepare("INSERT INTO place (place, session, frame, timestamp, content, "
+                              "checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6)")),
+      features_(
+          database.prepare("INSERT INTO features (place, features, checksum) VALUES (?1, ?2, ?3)")),
+      image_(database.prepare("INSERT INTO image (place, image, checksum) VALUES (?1, ?2, ?3)")),
+      loop_(database.prepare(insertion_of_loop("loop"))),
+      rejected_(database.prepare(insertion_of_loop("rejected"))) {}
 
 void RowWriter::write(const MapSession& session) {
-  session_.bind(1, std::int64_t{session.session});
-  session_.bind(2, std::string_view(session.uid));
-  session_.bind(3, std::string_view(session.name));
-  session_.bind(4, std::string_view(session.started));
-  session_.bind(5, std::string_view(session.loopbit));
-  session_.bind(6, std::string_view(session.options));
-  session_.bind(7, session.frames);
-  session_.bind(8, checksum_of(session).value());
-  session_.step();
-  session_.reset();
+  session_->bind(1, std::int64_t{session.session});
+  session_->bind(2, std::string_view(session.uid));
+  session_->bind(3, std::string_view(session.name));
+  session_->bind(4, std::string_view(session.started));
+  session_->bind(5, std::string_view(session.loopbit));
+  session_->bind(6, std::string_view(session.options));
+  session_->bind(7, session.frames);
+  session_->bind(8, checksum_of(session).value());
+  session_->step();
+  session_->reset();
 }
 
 void RowWriter::write(const MapPlace& place, const Features& features) {
-  place_.bind(1, place.id);
-  place_.bind(2, std::int64_t{place.at.session});
-  place_.bind(3, std::int64_t{place.at.frame});
-  place.timestamp_s ? place_.bind(4, *place.timestamp_s) : place_.bind_null(4);
-  place_.bind(5, content_bytes(place.content));
-  place_.bind(6, checksum_of(place).value());
-  place_.step();
-  place_.reset();
+  place_->bind(1, place.id);
+  place_->bind(2, std::int64_t{place.at.session});
+  place_->bind(3, std::int64_t{place.at.frame});
+  place.timestamp_s ? place_->bind(4, *place.timestamp_s) : place_->bind_null(4);
+  place_->bind(5, content_bytes(place.content));
+  place_->bind(6, checksum_of(place).value());
+  place_->step();
+  place_->reset();
   const std::vector<unsigned char> bytes = features_bytes(features);
-  features_.bind(1, place.id);
-  features_.bind(2, bytes);
-  features_.bind(3, checksum_of(place.at).add(bytes).value());
-  features_.step();
-  features_.reset();
+  features_->bind(1, place.id);
+  features_->bind(2, bytes);
+  features_->bind(3, checksum_of(place.at).add(bytes).value());
+  features_->step();
+  features_->reset();
 }
 
 void RowWriter::write_image(const MapPlace& place, std::span<const unsigned char> jpeg) {
   if (jpeg.empty()) return;
-  image_.bind(1, place.id);
-  image_.bind(2, jpeg);
-  image_.bind(3, checksum_of_image(jpeg, place.at).value());
-  image_.step();
-  image_.reset();
+  image_->bind(1, place.id);
+  image_->bind(2, jpeg);
+  image_->bind(3, checksum_of_image(jpeg, place.at).value());
+  image_->step();
+  image_->reset();
 }
 
-void RowWriter::write(const MapLoop& loop) { write_loop(loop_, loop, checksum_of(loop)); }
+void RowWriter::write(const MapLoop& loop) { write_loop(*loop_, loop, checksum_of(loop)); }
 
 void RowWriter::write_rejected(const MapLoop& loop) {
-  write_loop(rejected_, loop, checksum_of_rejected(loop));
+  write_loop(*rejected_, loop, checksum_of_rejected(loop));
 }
 
 void RowWriter::write_linked(int session) {
-  linked_.bind(1, std::int64_t{session});
-  linked_.bind(2, checksum_of_linked(session).value());
-  linked_.step();
-  linked_.reset();
+  linked_->bind(1, std::int64_t{session});
+  linked_->bind(2, checksum_of_linked(session).value());
+  linked_->step();
+  linked_->reset();
 }
 
-void remove_place(const Database& database, std::int64_t place) {
-  for (const char* table : {"place", "features", "image"}) {
-    database.execute(fmt::format("DELETE FROM {} WHERE place = {}", table, place));
+void remove_place(const MapDatabase& database, std::int64_t place) {
+  for (const char* table : {"features", "image", "place"}) {
+    const auto row = database.prepare(fmt::format("DELETE FROM {} WHERE place = ?1", table));
+    row->bind(1, place);
+    row->step();
   }
 }
 
-void reject_loop(const Database& database, const SessionFrame& query, const SessionFrame& match) {
-  const std::string pair =
-      fmt::format("session = {} AND frame = {} AND match_session = {} AND match_frame = {}",
-                  query.session, query.frame, match.session, match.frame);
-  if (database.integer("SELECT count(*) FROM rejected WHERE " + pair) == 0) {
-    MapLoop loop{.query = query, .match = match};
-    Statement found(database, "SELECT score, similarity, matches, inliers FROM loop WHERE " + pair);
-    if (found.step()) {
-      loop.score = found.real(0);
-      loop.similarity = found.real(1);
-      loop.matches = narrow(found.integer(2));
-      loop.inliers = narrow(found.integer(3));
+void reject_loop(const MapDatabase& database, const SessionFrame& query,
+                 const SessionFrame& match) {
+  const auto of_pair = [&](const std::string& what) {
+    auto statement = database.prepare(
+        what + " WHERE session = ?1 AND frame = ?2 AND match_session = ?3 AND match_frame = ?4");
+    int parameter = 0;
+    for (const int value : {query.session, query.frame, match.session, match.frame}) {
+      statement->bind(++parameter, std::int64_t{value});
     }
-    found.reset();
+    return statement;
+  };
+  if (!of_pair("SELECT rejected FROM rejected")->step()) {
+    MapLoop loop{.query = query, .match = match};
+    const auto found = of_pair("SELECT score, similarity, matches, inliers FROM loop");
+    if (found->step()) {
+      loop.score = found->real(0);
+      loop.similarity = found->real(1);
+      loop.matches = narrow(found->integer(2));
+      loop.inliers = narrow(found->integer(3));
+    }
+    found->reset();
     RowWriter(database).write_rejected(loop);
   }
-  database.execute("DELETE FROM loop WHERE " + pair);
-}
-
-// The sequence alone is enough unless the map is damaged.
-int next_session(const Database& database) {
-  return narrow(
-      1 + std::max(database.integer("SELECT max(session) FROM session"),
-                   database.integer("SELECT seq FROM sqlite_sequence WHERE name = 'session'")));
-}
-
-std::int64_t next_place(const Database& database) {
-  return 1 + std::max(database.integer("SELECT max(place) FROM place"),
-                      database.integer("SELECT seq FROM sqlite_sequence WHERE name = 'place'"));
+  of_pair("DELETE FROM loop")->step();
 }
 
 }  // namespace loopbit

@@ -4,13 +4,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <unordered_set>
 #include <vector>
 
-#include "loopbit/database.hpp"
+#include "loopbit/map_database.hpp"
 #include "loopbit/map_file.hpp"
 
 namespace loopbit {
@@ -36,18 +37,18 @@ class Damage {
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);
 
 /// Of an older map, no session but the first is linked.
-std::vector<MapSession> read_sessions(const Database& database, Damage& damage);
+std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damage);
 
 /// In order of id.
-void for_each_place(const Database& database, const std::function<void(const MapPlace&)>& visit,
+void for_each_place(const MapDatabase& database, const std::function<void(const MapPlace&)>& visit,
                     Damage& damage);
 
 /// Calls visit(place, bytes) for each image, damaged or not, in order of place.
-void for_each_image(const Database& database,
+void for_each_image(const MapDatabase& database,
                     const std::function<void(std::int64_t, std::int64_t)>& visit, Damage& damage);
 
-std::vector<MapLoop> read_loops(const Database& database, Damage& damage);
-std::vector<MapLoop> read_rejected_loops(const Database& database, Damage& damage);
+std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage);
+std::vector<MapLoop> read_rejected_loops(const MapDatabase& database, Damage& damage);
 
 /// The loop of `session` that a detection, one of a loop, is.
 MapLoop loop_of(const Detection& detection, int session);
@@ -56,19 +57,19 @@ MapLoop loop_of(const LateLoop& loop, int session);
 /// Reads features by place.
 class FeatureReader {
  public:
-  explicit FeatureReader(const Database& database);
+  explicit FeatureReader(const MapDatabase& database);
 
   /// None, with a clause in `damage`, if they are missing, damaged or belong to another place.
   std::optional<Features> read(std::int64_t place, const SessionFrame& at, Damage& damage);
 
  private:
-  Statement row_;
+  std::unique_ptr<SqlStatement> row_;
 };
 
 /// Reads images by place.
 class ImageReader {
  public:
-  explicit ImageReader(const Database& database);
+  explicit ImageReader(const MapDatabase& database);
 
   /// None if there is no image or, with a clause in `damage`, if it is damaged or belongs to
   /// another place.
@@ -76,13 +77,13 @@ class ImageReader {
                                                  Damage& damage);
 
  private:
-  std::optional<Statement> row_;  ///< none if the map's version has no images
+  std::unique_ptr<SqlStatement> row_;  ///< null if the map's version has no images
 };
 
 /// Writes rows in the current transaction. Throws Error (kind output).
 class RowWriter {
  public:
-  explicit RowWriter(const Database& database);
+  explicit RowWriter(const MapDatabase& database);
 
   /// Of an existing session, updates the number of frames. Does not write whether it is linked.
   void write(const MapSession& session);
@@ -94,26 +95,22 @@ class RowWriter {
   void write_rejected(const MapLoop& loop);
 
  private:
-  Statement session_;
-  Statement linked_;
-  Statement place_;
-  Statement features_;
-  Statement image_;
-  Statement loop_;
-  Statement rejected_;
+  std::unique_ptr<SqlStatement> session_;
+  std::unique_ptr<SqlStatement> linked_;
+  std::unique_ptr<SqlStatement> place_;
+  std::unique_ptr<SqlStatement> features_;
+  std::unique_ptr<SqlStatement> image_;
+  std::unique_ptr<SqlStatement> loop_;
+  std::unique_ptr<SqlStatement> rejected_;
 };
 
 // Changes of rows in the current transaction. They throw Error (kind output).
 
 /// Removes a place with its features and image.
-void remove_place(const Database& database, std::int64_t place);
+void remove_place(const MapDatabase& database, std::int64_t place);
 
 /// Moves the loop to those that are rejected. If there is no such loop, the pair is recorded all
 /// the same. Linear in the loops of the map.
-void reject_loop(const Database& database, const SessionFrame& query, const SessionFrame& match);
-
-/// The next free keys.
-int next_session(const Database& database);
-std::int64_t next_place(const Database& database);
+void reject_loop(const MapDatabase& database, const SessionFrame& query, const SessionFrame& match);
 
 }  // namespace loopbit

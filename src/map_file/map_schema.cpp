@@ -168,13 +168,11 @@ void check_may_be_written(const std::string& path) {
 
 }  // namespace
 
-bool has_images(const Database& database) {
-  return database.integer("PRAGMA user_version") >= kFirstVersionWithImages;
+bool has_images(const MapDatabase& database) {
+  return database.version() >= kFirstVersionWithImages;
 }
 
-bool has_links(const Database& database) {
-  return database.integer("PRAGMA user_version") >= kFirstVersionWithLinks;
-}
+bool has_links(const MapDatabase& database) { return database.version() >= kFirstVersionWithLinks; }
 
 Database open_map_for_writing(const std::string& path, int version) {
   Database database = lock_map(path);

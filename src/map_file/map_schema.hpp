@@ -5,6 +5,7 @@
 #include <string>
 
 #include "loopbit/database.hpp"
+#include "loopbit/map_database.hpp"
 
 namespace loopbit {
 
@@ -54,10 +55,10 @@ class Commit {
 bool is_being_written(const std::string& path);
 
 /// Whether the map's version has images.
-bool has_images(const Database& database);
+bool has_images(const MapDatabase& database);
 
 /// Whether the map's version has the tables `linked` and `rejected`.
-bool has_links(const Database& database);
+bool has_links(const MapDatabase& database);
 
 /// Opens a map for reading, also while it is written. Throws Error (kind input) as above.
 Database open_map_for_reading(const std::string& path);

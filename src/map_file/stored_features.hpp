@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "loopbit/database.hpp"
+#include "loopbit/map_database.hpp"
 #include "loopbit/place_index.hpp"
 #include "loopbit/surf.hpp"
 
@@ -47,7 +47,7 @@ class FeatureCache {
 /// The features of a map's places, by the detector's numbers, with a cache.
 class StoredFeatures {
  public:
-  StoredFeatures(const Database& database, std::size_t cache_mb)
+  StoredFeatures(const MapDatabase& database, std::size_t cache_mb)
       : reader_(database), cache_(cache_mb << 20U) {}
 
   /// Call this before add(). A second call throws Error (kind option), since the places of the map

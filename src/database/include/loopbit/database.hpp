@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "loopbit/open_file.hpp"
+#include "loopbit/sql_statement.hpp"
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -79,32 +80,25 @@ class Database {
   std::unique_ptr<sqlite3, Close> handle_;
 };
 
-/// A prepared statement. Parameters count from 1, columns from 0. The database must outlive it.
-class Statement {
+/// A prepared statement of a Database.
+class Statement final : public SqlStatement {
  public:
-  enum class Step { row, end, damaged };
-
   Statement(const Database& database, const std::string& sql);
 
-  void bind(int parameter, std::int64_t value);
-  void bind(int parameter, double value);
-  /// Bytes and text must stay where they are until the next reset().
-  void bind(int parameter, std::span<const unsigned char> bytes);
-  void bind(int parameter, std::string_view text);
-  void bind_null(int parameter);
+  void bind(int parameter, std::int64_t value) override;
+  void bind(int parameter, double value) override;
+  void bind(int parameter, std::span<const unsigned char> bytes) override;
+  void bind(int parameter, std::string_view text) override;
+  void bind_null(int parameter) override;
 
-  /// True if there is a row, false at the end.
-  bool step();
-  /// The same, but what cannot be read of a damaged file or disk is no Error.
-  Step step_if_readable();
-  void reset();
+  bool step() override;
+  Step step_if_readable() override;
+  void reset() override;
 
-  [[nodiscard]] std::int64_t integer(int column) const;
-  [[nodiscard]] double real(int column) const;
-  [[nodiscard]] bool is_null(int column) const;
-  [[nodiscard]] std::string text(int column) const;
-  /// Valid until the next step() or reset().
-  [[nodiscard]] std::span<const unsigned char> bytes(int column) const;
+  [[nodiscard]] std::int64_t integer(int column) const override;
+  [[nodiscard]] double real(int column) const override;
+  [[nodiscard]] bool is_null(int column) const override;
+  [[nodiscard]] std::span<const unsigned char> bytes(int column) const override;
 
  private:
   struct Finalize {

@@ -1,0 +1,47 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "loopbit/database.hpp"
+#include "loopbit/map_database.hpp"
+
+namespace loopbit {
+
+/// A map in a SQLite file.
+class FileDatabase final : public MapDatabase {
+ public:
+  explicit FileDatabase(Database file) : file_(std::move(file)) {}
+
+  [[nodiscard]] const Database& file() const { return file_; }
+
+  [[nodiscard]] const std::string& path() const override { return file_.path(); }
+  [[nodiscard]] int version() const override;
+  [[nodiscard]] std::unique_ptr<SqlStatement> prepare(const std::string& sql) const override;
+  [[nodiscard]] std::unique_ptr<Transaction> begin() const override;
+  void prepare_long_transaction() const override;
+  [[nodiscard]] std::vector<int> new_sessions(std::size_t number) const override;
+  [[nodiscard]] std::int64_t place_key(const SessionFrame& at,
+                                       std::int64_t previous) const override;
+  [[nodiscard]] bool is_being_written() const override { return file_.file().is_locked(); }
+  [[nodiscard]] std::int64_t bytes() const override;
+  [[nodiscard]] std::string fault() const override;
+  [[nodiscard]] std::vector<std::string> structure_faults() const override;
+  void close() override;
+
+ private:
+  Database file_;
+};
+
+/// Opens a map for reading; see open_map_for_reading().
+std::unique_ptr<MapDatabase> open_map_to_read(const std::string& path);
+
+/// Opens a map for adding to it; see open_map_for_writing().
+std::unique_ptr<MapDatabase> open_map_to_write(const std::string& path);
+
+}  // namespace loopbit

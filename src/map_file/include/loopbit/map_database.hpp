@@ -1,0 +1,79 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "loopbit/detection.hpp"
+#include "loopbit/sql_statement.hpp"
+
+namespace loopbit {
+
+/// Where the tables of a map are, as docs/format.md describes them. All SQL for these tables runs
+/// through this interface; what differs between databases is behind it. For one thread at a time.
+class MapDatabase {
+ public:
+  /// Is rolled back unless end() is called.
+  class Transaction {
+   public:
+    Transaction() = default;
+    virtual ~Transaction() = default;
+    Transaction(const Transaction&) = delete;
+    Transaction& operator=(const Transaction&) = delete;
+    Transaction(Transaction&&) = delete;
+    Transaction& operator=(Transaction&&) = delete;
+
+    /// Commits. The rows are on disk when this returns.
+    virtual void end() = 0;
+  };
+
+  MapDatabase() = default;
+  virtual ~MapDatabase() = default;
+  MapDatabase(const MapDatabase&) = delete;
+  MapDatabase& operator=(const MapDatabase&) = delete;
+  MapDatabase(MapDatabase&&) = delete;
+  MapDatabase& operator=(MapDatabase&&) = delete;
+
+  /// The map's name for messages.
+  [[nodiscard]] virtual const std::string& path() const = 0;
+
+  /// The version of its tables; see kMapVersion.
+  [[nodiscard]] virtual int version() const = 0;
+
+  [[nodiscard]] virtual std::unique_ptr<SqlStatement> prepare(const std::string& sql) const = 0;
+
+  /// Begins to write. Throws Error (kind output).
+  [[nodiscard]] virtual std::unique_ptr<Transaction> begin() const = 0;
+
+  /// Call this before a transaction with many rows, so that readers need not wait for it.
+  virtual void prepare_long_transaction() const = 0;
+
+  /// The numbers of new sessions, ascending.
+  [[nodiscard]] virtual std::vector<int> new_sessions(std::size_t number) const = 0;
+
+  /// The key of a place that is added after the one with the key `previous`; 0 = the first to be
+  /// added. Successive frames of a session have successive keys.
+  [[nodiscard]] virtual std::int64_t place_key(const SessionFrame& at,
+                                               std::int64_t previous) const = 0;
+
+  /// Whether a program, this one or another, writes sessions to the map.
+  [[nodiscard]] virtual bool is_being_written() const = 0;
+
+  /// Its size on disk.
+  [[nodiscard]] virtual std::int64_t bytes() const = 0;
+
+  /// Empty, or a fault for which it cannot be written.
+  [[nodiscard]] virtual std::string fault() const = 0;
+
+  /// The faults of its structure. Reads all of it.
+  [[nodiscard]] virtual std::vector<std::string> structure_faults() const = 0;
+
+  /// Call this when all is written, and nothing is read through it any more.
+  virtual void close() = 0;
+};
+
+}  // namespace loopbit
