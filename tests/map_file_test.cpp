@@ -3,6 +3,7 @@
 #include "loopbit/map_file.hpp"
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -376,6 +377,30 @@ TEST_F(MapFile, ADamagedMapIsNotWrittenToButRecovered) {
   expect_only_true_places(recovered);
   expect_error(ErrorKind::output, {path("new.db"), "exists"},
                [&] { recover_map(map_path_, path("new.db")); });
+}
+
+TEST_F(MapFile, WithoutAServerAnAddressIsRefusedAndItsPasswordNotTold) {
+  const std::string address = "postgresql://robot:secret@host/town";
+  const std::vector<std::function<void()>> uses{
+      [&] { MapReader map(address); },
+      [&] { MapWriter(address, fast_options(), "drive"); },
+      [&] { merge_map(map_path_, address); },
+      [&] { merge_map(address, map_path_); },
+      [&] { compact_map(address, {.drop_sessions = {1}}); },
+      [&] { recover_map(address, path("new.db")); },
+      [&] { recover_map(map_path_, address); },
+  };
+  add_session(map_path_, 1);
+  for (const auto& use : uses) {
+    try {
+      use();
+      FAIL() << "no error";
+    } catch (const Error& error) {
+      EXPECT_EQ(error.kind(), ErrorKind::option);
+      EXPECT_NE(std::string(error.what()).find("postgresql://..."), std::string::npos);
+      EXPECT_EQ(std::string(error.what()).find("secret"), std::string::npos) << error.what();
+    }
+  }
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -14,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "loopbit/error.hpp"
+#include "loopbit/map_server.hpp"
 #include "loopbit/map_tools.hpp"
 #include "loopbit/printable.hpp"
 
@@ -68,9 +68,9 @@ void info_command(const std::string& path, bool json) {
   const std::int64_t loops = sum(loops_of(map));
   const std::size_t rejected = map.rejected_loops().size();
   const MapImages images = map.images();
-  const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(path));
+  const std::int64_t bytes = map.bytes();
   if (json) {
-    Json info{{"path", path},
+    Json info{{"path", map.path()},
               {"bytes", bytes},
               {"sessions", map.sessions().size()},
               {"places", places},
@@ -83,7 +83,7 @@ void info_command(const std::string& path, bool json) {
     if (!map.sessions().empty()) info["options"] = Json::parse(to_json(map.options()));
     fmt::print("{}\n", dump(info));
   } else {
-    fmt::print("map        {}, {:.1f} MB", printable(path), static_cast<double>(bytes) / 1e6);
+    fmt::print("map        {}, {:.1f} MB", printable(map.path()), static_cast<double>(bytes) / 1e6);
     if (places > 0)
       fmt::print(", {:.1f} KB per place",
                  static_cast<double>(bytes) / 1e3 / static_cast<double>(places));
@@ -135,8 +135,8 @@ void list_command(const std::string& path, bool json) {
 void merge_command(const std::string& into, const std::vector<std::string>& others) {
   for (const std::string& other : others) {
     const MergeCounts counts = merge_map(into, other);
-    fmt::print("merged     {}: {} sessions, {} places, {} loops", printable(other), counts.sessions,
-               counts.places, counts.loops);
+    fmt::print("merged     {}: {} sessions, {} places, {} loops", printable(without_secrets(other)),
+               counts.sessions, counts.places, counts.loops);
     if (counts.known > 0) fmt::print("; {} sessions were already there", counts.known);
     fmt::print("\n");
   }
@@ -189,9 +189,14 @@ int check_command(const std::string& path, const std::string& recover) {
   }
   if (!check.damage.empty()) {
     fmt::print("remedy     loopbit map check {} --recover NEW.db copies all undamaged rows\n",
-               path);
+               without_secrets(path));
   }
   return check.damage.empty() ? success : bad_input;
+}
+
+void create_command(const std::string& address) {
+  const bool is_new = create_map(address);
+  fmt::print("{}    {}\n", is_new ? "created" : "exists ", printable(without_secrets(address)));
 }
 
 void compact_command(const std::string& path, const CompactOptions& options) {
@@ -222,7 +227,8 @@ using Flags = std::shared_ptr<MapFlags>;
 
 CLI::App* add_command(CLI::App& map, const Flags& flags, const char* name, const char* what) {
   CLI::App* command = map.add_subcommand(name, what);
-  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map'")->required();
+  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map', or its address")
+      ->required();
   return command;
 }
 
@@ -261,6 +267,11 @@ void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
 }
 
 void add_writers(CLI::App& map, const Flags& flags, int& exit_code) {
+  CLI::App* create = map.add_subcommand(
+      "create", "Make an empty map, and the roles that use it, in a PostgreSQL database");
+  create->add_option("ADDRESS", flags->map, "Such as postgresql://owner@host/town")->required();
+  create->callback([flags] { create_command(flags->map); });
+
   CLI::App* merge = add_command(map, flags, "merge", "Add the sessions of other maps to a map");
   merge
       ->add_option("OTHER", flags->others, "Maps to add; sessions that MAP already has are skipped")

@@ -57,13 +57,13 @@ LoopDetectorOptions detector_options(const MapReader& map, const QueryFlags& fla
       throw Error(ErrorKind::option,
                   fmt::format("{} is fixed by '{}', which was made with it; make another "
                               "map with 'loopbit run --map'.",
-                              name, flags.map));
+                              name, map.path()));
     }
     if (name.starts_with("exclusion.")) {
       throw Error(ErrorKind::option,
                   fmt::format("{} has no effect on a query: all places of '{}' are candidates; "
                               "leave it out.",
-                              name, flags.map));
+                              name, map.path()));
     }
     set_option(options, name, value);
   }
@@ -262,7 +262,8 @@ void add_query(CLI::App& app, int& exit_code) {
   auto flags = std::make_shared<QueryFlags>();
   CLI::App* command =
       app.add_subcommand("query", "Find the places of a map that single images show");
-  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map'")->required();
+  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map', or its address")
+      ->required();
   command->add_option("IMAGE", flags->images,
                       "Images, or anything else that 'loopbit run' accepts; each image is a "
                       "separate query");

@@ -17,6 +17,10 @@
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#ifdef LOOPBIT_HAS_FLEET
+#include "loopbit/fleet_map.hpp"
+#endif
+#include "loopbit/map_server.hpp"
 #include "loopbit/version.hpp"
 
 #include "commands.hpp"
@@ -89,12 +93,16 @@ void check_command(const CLI::App& app, const std::string& name, int at, int arg
     if (command->get_require_subcommand_min() == 0) return;
     return check_command(*command, fmt::format("{} {}", name, word), at + 1, argc, argv);
   }
-  throw loopbit::Error(ErrorKind::option,
-                       fmt::format("There is no {} '{}'; '{} --help' lists them.",
-                                   is_option ? "option" : "command", word, name));
+  throw loopbit::Error(
+      ErrorKind::option,
+      fmt::format("There is no {} '{}'; '{} --help' lists them.", is_option ? "option" : "command",
+                  loopbit::without_secrets(word), name));
 }
 
 int run_command_line(int argc, char** argv) {
+#ifdef LOOPBIT_HAS_FLEET
+  loopbit::use_fleet_maps();
+#endif
   CLI::App app{
       "loopbit detects visual loop closures: whether a camera is back at an earlier place."};
   app.formatter(std::make_shared<Help>());
@@ -120,7 +128,9 @@ int run_command_line(int argc, char** argv) {
     std::ostringstream told;
     std::string line;
     const int code = app.exit(error, std::cout, told);
-    for (std::istringstream lines(told.str()); std::getline(lines, line);) cli::tell(line + '\n');
+    for (std::istringstream lines(told.str()); std::getline(lines, line);) {
+      cli::tell(loopbit::without_secrets(line) + '\n');
+    }
     return code == 0 ? cli::success : cli::bad_option;
   }
   return exit_code;

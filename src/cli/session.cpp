@@ -107,8 +107,9 @@ void SessionFlags::add_to(CLI::App& command) {
   command.add_flag("--overwrite", run.overwrite, "Replace an earlier run in the output folder");
   command
       .add_option("--map", run.map,
-                  "Continue this map, or create it. Places of earlier sessions are recognised")
-      ->type_name("MAP.db");
+                  "Continue this map, or create it; or continue the one of a PostgreSQL database, "
+                  "postgresql://... Places of earlier sessions are recognised")
+      ->type_name("MAP");
   command.add_flag("--keep-images", run.keep_images, "Store a small JPEG of each place in the map")
       ->needs("--map");
   add_map_cache_flag(command, run.map_cache_mb);
@@ -230,7 +231,7 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   if (!outcome.record.early_end.empty()) {
     tell(fmt::format("loopbit: {}\n", outcome.record.early_end));
   }
-  warn_of_damage(request.map, outcome.map_damage);
+  warn_of_damage(outcome.record.map_path, outcome.map_damage);
   const std::string report = request.evidence ? report_in(outcome.folder) : "";
   if (!report.empty()) write_report(report, {report_run(outcome.folder)}, flags.report);
   if (live) live->finish(report);

@@ -115,9 +115,10 @@ void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& ch
   const auto transaction = database_->begin();
   if (!rows_) rows_.emplace(*database_);
   if (!batch.empty()) {
-    if (session_.frames == 0) rows_->write_linked(session_.session);
+    const bool begins = session_.frames == 0;
     session_.frames = batch.back().detection.frame + 1;
     rows_->write(session_);
+    if (begins && session_.linked) rows_->write_linked(session_.session);
   }
   for (const AddedFrame& frame : batch) write(frame);
   for (const auto& change : changes) change(*database_);

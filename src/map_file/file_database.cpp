@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <numeric>
 
 #include "map_log.hpp"
@@ -21,6 +22,13 @@ class FileTransaction final : public MapDatabase::Transaction {
   Commit commit_;
 };
 
+/// Each statement reads what was committed before it. A writer has the file to itself, and what
+/// others read of it needs no more.
+class NoTransaction final : public MapDatabase::Transaction {
+ public:
+  void end() override {}
+};
+
 /// The next free key. The sequence alone is enough unless the map is damaged.
 std::int64_t next_key(const Database& file, const std::string& table) {
   return 1 + std::max(file.integer("SELECT max(" + table + ") FROM " + table),
@@ -35,6 +43,12 @@ std::unique_ptr<SqlStatement> FileDatabase::prepare(const std::string& sql) cons
   return std::make_unique<Statement>(file_, sql);
 }
 
+std::int64_t FileDatabase::rows_at_once() const { return std::numeric_limits<std::int64_t>::max(); }
+
+std::unique_ptr<MapDatabase::Transaction> FileDatabase::snapshot() const {
+  return std::make_unique<NoTransaction>();
+}
+
 std::unique_ptr<MapDatabase::Transaction> FileDatabase::begin() const {
   return std::make_unique<FileTransaction>(file_);
 }
@@ -43,6 +57,10 @@ void FileDatabase::prepare_long_transaction() const {
   if (has_log(file_)) return;  // readers see what was there before
   mark(file_);
   begin_log(file_);
+}
+
+MapDatabase::NewSession FileDatabase::begin_session() const {
+  return {.session = new_sessions(1).front()};
 }
 
 std::vector<int> FileDatabase::new_sessions(std::size_t number) const {
@@ -74,13 +92,5 @@ std::vector<std::string> FileDatabase::structure_faults() const {
 }
 
 void FileDatabase::close() { close_log(file_); }
-
-std::unique_ptr<MapDatabase> open_map_to_read(const std::string& path) {
-  return std::make_unique<FileDatabase>(open_map_for_reading(path));
-}
-
-std::unique_ptr<MapDatabase> open_map_to_write(const std::string& path) {
-  return std::make_unique<FileDatabase>(open_map_for_writing(path));
-}
 
 }  // namespace loopbit

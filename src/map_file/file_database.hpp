@@ -23,8 +23,11 @@ class FileDatabase final : public MapDatabase {
   [[nodiscard]] const std::string& path() const override { return file_.path(); }
   [[nodiscard]] int version() const override;
   [[nodiscard]] std::unique_ptr<SqlStatement> prepare(const std::string& sql) const override;
+  [[nodiscard]] std::int64_t rows_at_once() const override;
+  [[nodiscard]] std::unique_ptr<Transaction> snapshot() const override;
   [[nodiscard]] std::unique_ptr<Transaction> begin() const override;
   void prepare_long_transaction() const override;
+  [[nodiscard]] NewSession begin_session() const override;
   [[nodiscard]] std::vector<int> new_sessions(std::size_t number) const override;
   [[nodiscard]] std::int64_t place_key(const SessionFrame& at,
                                        std::int64_t previous) const override;
@@ -38,10 +41,8 @@ class FileDatabase final : public MapDatabase {
   Database file_;
 };
 
-/// Opens a map for reading; see open_map_for_reading().
-std::unique_ptr<MapDatabase> open_map_to_read(const std::string& path);
-
-/// Opens a map for adding to it; see open_map_for_writing().
-std::unique_ptr<MapDatabase> open_map_to_write(const std::string& path);
+/// Opens a map in a file, or on a server. Throws Error as open_map_for_reading() or
+/// open_map_for_writing() do, or MapServer::open().
+std::unique_ptr<MapDatabase> open_map(const std::string& path, MapDatabase::Access access);
 
 }  // namespace loopbit

@@ -20,7 +20,7 @@ namespace {
 std::vector<std::int64_t> listed_images(const std::string& path, Damage& damage) {
   std::vector<std::int64_t> places;
   for_each_image(
-      *open_map_to_read(path),
+      *open_map(path, MapDatabase::Access::read),
       [&](std::int64_t place, std::int64_t /*bytes*/) { places.push_back(place); }, damage);
   return places;
 }

@@ -24,6 +24,7 @@
 #include <unistd.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/map_server.hpp"
 #include "loopbit/map_tools.hpp"
 #include "loopbit/write_file.hpp"
 
@@ -166,10 +167,11 @@ MergePlan plan_of(const MapDatabase& to, const MapReader& source) {
 
 /// The next merge would take an incomplete session for a known one.
 void refuse_unfinished(const std::string& from) {
-  if (!is_being_written(from)) return;
+  const auto database = open_map(from, MapDatabase::Access::read);
+  if (!database->is_being_written()) return;
   throw Error(ErrorKind::input, fmt::format("'{}' is being written: only a part of its session "
                                             "would be copied; merge it when its run has ended.",
-                                            from));
+                                            database->path()));
 }
 
 /// Adds the sessions of `source` that `into` lacks, in one transaction.
@@ -329,7 +331,7 @@ void rename_to_new(const std::string& from, const std::string& to) {
 MapCheck recover_to_new(const std::string& from, const std::string& to) {
   std::error_code error;
   const bool has_page = fs::file_size(from, error) >= kMapPageBytes && !error;
-  if (is_newer_map(from) || can_be_opened(from) || !has_page) {
+  if (is_map_address(from) || is_newer_map(from) || can_be_opened(from) || !has_page) {
     MapReader source(from);
     return copy_to_new(source, to);
   }
@@ -426,7 +428,7 @@ void check_unused(const Database& old) {
 MergeCounts merge_map(const std::string& into, const std::string& from) {
   auto source = std::make_unique<MapReader>(from);
   refuse_unfinished(from);
-  const auto to = open_map_to_write(into);
+  const auto to = open_map(into, MapDatabase::Access::write);
   try {
     const MergeCounts counts = merge(*to, *source);
     source.reset();  // it may read the same map
@@ -440,6 +442,12 @@ MergeCounts merge_map(const std::string& into, const std::string& from) {
 }
 
 MapCheck recover_map(const std::string& from, const std::string& to) {
+  if (is_map_address(to)) {
+    throw Error(ErrorKind::option,
+                fmt::format("'{0}' is on a server, but maps are recovered to a file; give NEW.db, "
+                            "and 'loopbit map merge {0} NEW.db' adds it.",
+                            without_secrets(to)));
+  }
   std::error_code error;
   // A broken symbolic link is not replaced, either.
   if (fs::exists(fs::symlink_status(to, error))) throw already_there(to);
@@ -460,7 +468,7 @@ MapCheck recover_map(const std::string& from, const std::string& to) {
     throw Error(ErrorKind::input, fmt::format("Nothing of '{}' can be recovered: it is no map of "
                                               "loopbit's, or no session in it is whole; use a "
                                               "copy from before.",
-                                              from));
+                                              without_secrets(from)));
   } catch (const Error&) {
     remove_database(part);
     throw;
@@ -468,6 +476,12 @@ MapCheck recover_map(const std::string& from, const std::string& to) {
 }
 
 CompactCounts compact_map(const std::string& path, const CompactOptions& options) {
+  if (is_map_address(path)) {
+    throw Error(ErrorKind::option,
+                fmt::format("'{0}' is on a server, but only map files are compacted; 'loopbit map "
+                            "merge NEW.db {0}' copies it to a file.",
+                            without_secrets(path)));
+  }
   (void)open_map_for_reading(path);  // it must exist
   const Database old = open_map_for_writing(path);
   const std::string file = resolved_path(path);

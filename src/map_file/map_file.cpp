@@ -47,8 +47,8 @@ std::string now_utc() {
 
 struct MapReader::Impl {
   Impl(const std::string& map_path, std::size_t cache_mb)
-      : path(map_path),
-        database(open_map_to_read(map_path)),
+      : database(open_map(map_path, MapDatabase::Access::read)),
+        path(database->path()),
         features(*database),
         images(*database),
         stored(*database, cache_mb),
@@ -56,8 +56,8 @@ struct MapReader::Impl {
     if (const std::string fault = database->fault(); !fault.empty()) damage.add(fault);
   }
 
-  std::string path;
   std::unique_ptr<MapDatabase> database;
+  std::string path;
   FeatureReader features;
   ImageReader images;
   StoredFeatures stored;  ///< of the places that for_each_earlier_place() visited
@@ -112,6 +112,8 @@ std::optional<std::vector<unsigned char>> MapReader::image_of(const MapPlace& pl
   return impl_->images.read(place.id, place.at, impl_->damage);
 }
 
+std::int64_t MapReader::bytes() const { return impl_->database->bytes(); }
+
 std::vector<std::string> MapReader::check_structure() const {
   return impl_->database->structure_faults();
 }
@@ -149,17 +151,17 @@ void MapReader::reject(const SessionFrame& /*query*/, const SessionFrame& /*matc
 
 class MapWriter::Impl {
  public:
-  Impl(std::string path, const LoopDetectorOptions& options, const std::string& name,
+  Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
        EncodeImage encode_image, std::size_t cache_mb)
-      : path_(std::move(path)),
-        options_(options),
+      : options_(options),
         keeps_images_(encode_image != nullptr),
-        writer_(begin_session(name, std::move(encode_image), cache_mb)) {}
+        writer_(begin_session(path, name, std::move(encode_image), cache_mb)) {}
 
   void finish() {
     if (!stored_) return;
     writer_->flush();
     stored_.reset();
+    snapshot_.reset();
     database_.reset();
     writer_->close();
   }
@@ -197,6 +199,7 @@ class MapWriter::Impl {
     (void)stored();  // not after finish()
     for (const MapLoop& loop : read_loops(*database_, damage_)) visit(loop.query, loop.match);
     refuse_damaged(path_, damage_.clauses());
+    snapshot_.reset();
   }
 
   std::shared_ptr<const Features> features(PlaceId place) {
@@ -208,6 +211,7 @@ class MapWriter::Impl {
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& image) {
     StoredFeatures& places = stored();
+    snapshot_.reset();  // of a detector that did not ask for earlier loops
     places.reserve_next();
     writer_->add({.content = content,
                   .detection = detection,
@@ -250,25 +254,35 @@ class MapWriter::Impl {
   [[nodiscard]] BatchWriter& writer() const { return *writer_; }
 
  private:
-  std::unique_ptr<BatchWriter> begin_session(const std::string& name, EncodeImage encode_image,
-                                             std::size_t cache_mb) {
-    std::unique_ptr<MapDatabase> database = open_map_to_write(path_);
-    for (const MapSession& session : read_sessions(*database, damage_)) {
-      check_same_shape(path_, session.options, options_);
-      sessions_.insert(session.session);
-    }
-    database_ = open_map_to_read(path_);
+  std::unique_ptr<BatchWriter> begin_session(const std::string& path, const std::string& name,
+                                             EncodeImage encode_image, std::size_t cache_mb) {
+    std::unique_ptr<MapDatabase> database = open_map(path, MapDatabase::Access::write);
+    path_ = database->path();
+    check_sessions(*database);
+    const MapDatabase::NewSession begun = database->begin_session();
+    session_ = begun.session;
+    database_ = open_map(path, MapDatabase::Access::read);
+    snapshot_ = database_->snapshot();
+    check_sessions(*database_);  // others may have begun some meanwhile
     stored_.emplace(*database_, cache_mb);
-    session_ = database->new_sessions(1).front();
     first_place_ = database->place_key({session_, 0}, 0);
     MapSession session{.session = session_,
                        .uid = new_uid(),
                        .name = name,
                        .started = now_utc(),
                        .loopbit = kVersion,
-                       .options = to_json(options_)};
+                       .options = to_json(options_),
+                       .linked = begun.is_linked};
     return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_,
                                          std::move(encode_image));
+  }
+
+  /// Throws Error (kind option) if they were made with other settings.
+  void check_sessions(const MapDatabase& database) {
+    for (const MapSession& session : read_sessions(database, damage_)) {
+      check_same_shape(path_, session.options, options_);
+      sessions_.insert(session.session);
+    }
   }
 
   /// Throws Error (kind option) after finish().
@@ -285,14 +299,15 @@ class MapWriter::Impl {
   [[nodiscard]] PlaceId session_begin() { return stored().size() - frames_; }
 
   pid_t process_ = getpid();
-  std::string path_;
+  std::string path_;             ///< for messages
   LoopDetectorOptions options_;  ///< of the session
   bool keeps_images_;
   std::set<int> sessions_;  ///< earlier ones
   int session_ = 0;
   std::int64_t first_place_ = 0;
-  PlaceId frames_ = 0;                     ///< of this session
-  std::unique_ptr<MapDatabase> database_;  ///< for reading; gone after finish()
+  PlaceId frames_ = 0;                                  ///< of this session
+  std::unique_ptr<MapDatabase> database_;               ///< for reading; gone after finish()
+  std::unique_ptr<MapDatabase::Transaction> snapshot_;  ///< until all earlier places were read
   std::optional<StoredFeatures> stored_;
   Damage damage_;
   std::unique_ptr<BatchWriter> writer_;

@@ -201,11 +201,11 @@ template <typename Progress>
 std::optional<std::vector<MapLoop>> new_loops_of(const MapSession& session, const std::string& path,
                                                  const LoopDetectorOptions& options,
                                                  const Progress& progress) {
-  const auto database = open_map_to_read(path);
-  Relived relived(path, *database, session.session, options);
+  const auto database = open_map(path, MapDatabase::Access::read);
+  Relived relived(database->path(), *database, session.session, options);
   Damage damage;
   const std::vector<MapPlace> places = places_of(*database, session.session, damage);
-  refuse_damaged(path, damage.clauses());
+  refuse_damaged(database->path(), damage.clauses());
   std::vector<MapLoop> found;
   for (const MapPlace& place : places) {
     relived.process(place, found);
@@ -230,14 +230,15 @@ void write_link(const MapDatabase& database, int session, const std::vector<MapL
 }
 
 /// The sessions that are not linked.
-std::vector<MapSession> unlinked_sessions(const std::string& path, const MapDatabase& database,
+std::vector<MapSession> unlinked_sessions(const MapDatabase& database,
                                           const std::optional<LoopDetectorOptions>& options) {
   Damage damage;
   std::vector<MapSession> sessions = read_sessions(database, damage);
-  refuse_damaged(path, damage.clauses());
+  refuse_damaged(database.path(), damage.clauses());
   if (options) {
     validate(*options);
-    for (const MapSession& session : sessions) check_same_shape(path, session.options, *options);
+    for (const MapSession& session : sessions)
+      check_same_shape(database.path(), session.options, *options);
   }
   std::erase_if(sessions, [](const MapSession& session) { return session.linked; });
   return sessions;
@@ -257,7 +258,7 @@ std::int64_t num_places(const MapDatabase& database, const std::vector<MapSessio
 LinkCounts link(const std::string& path, const MapDatabase& database,
                 const std::optional<LoopDetectorOptions>& options,
                 const std::function<bool(const LinkCounts&)>& progress) {
-  const std::vector<MapSession> sessions = unlinked_sessions(path, database, options);
+  const std::vector<MapSession> sessions = unlinked_sessions(database, options);
   LinkCounts counts;
   counts.total_places = num_places(database, sessions);
   for (const MapSession& session : sessions) {
@@ -267,8 +268,8 @@ LinkCounts link(const std::string& path, const MapDatabase& database,
       counts.loops = before.loops + static_cast<std::int64_t>(loops);
       return !progress || progress(counts);
     };
-    const auto loops =
-        new_loops_of(session, path, options ? *options : options_of(path, session), advance);
+    const auto loops = new_loops_of(
+        session, path, options ? *options : options_of(database.path(), session), advance);
     if (!loops) return before;
     write_link(database, session.session, *loops);
     ++counts.sessions;
@@ -280,8 +281,8 @@ LinkCounts link(const std::string& path, const MapDatabase& database,
 
 LinkCounts link_map(const std::string& path, const std::optional<LoopDetectorOptions>& options,
                     const std::function<bool(const LinkCounts&)>& progress) {
-  (void)open_map_to_read(path);  // it must exist
-  const auto database = open_map_to_write(path);
+  (void)open_map(path, MapDatabase::Access::read);  // it must exist
+  const auto database = open_map(path, MapDatabase::Access::link);
   try {
     const LinkCounts counts = link(path, *database, options, progress);
     database->close();

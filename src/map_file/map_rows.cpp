@@ -155,14 +155,18 @@ template <typename Visit>
 void for_each_row(const MapDatabase& database, const std::string& table, const std::string& columns,
                   Damage& damage, const Visit& visit) {
   const std::string key = columns.substr(0, columns.find(','));
-  const auto statement = database.prepare(
-      fmt::format("SELECT {} FROM {} WHERE {} >= ?1 ORDER BY {}", columns, table, key, key));
+  const auto statement = database.prepare(fmt::format(
+      "SELECT {} FROM {} WHERE {} >= ?1 ORDER BY {} LIMIT ?2", columns, table, key, key));
   SqlStatement& rows = *statement;
+  const auto snapshot = database.snapshot();
+  const std::int64_t at_once = database.rows_at_once();
   std::int64_t next = 1;
   std::int64_t damaged_from = 0;  // 0: not in a damaged range
   for (std::int64_t probes = 0; probes < kMaxProbes;) {
     rows.reset();
     rows.bind(1, next);
+    rows.bind(2, at_once);
+    std::int64_t number = 0;
     SqlStatement::Step step = rows.step_if_readable();
     for (; step == SqlStatement::Step::row; step = rows.step_if_readable()) {
       const std::int64_t at = rows.integer(0);
@@ -174,8 +178,10 @@ void for_each_row(const MapDatabase& database, const std::string& table, const s
       }
       visit(rows, at);
       next = at + 1;
+      ++number;
     }
     if (step == SqlStatement::Step::end) {
+      if (number == at_once) continue;  // there may be more
       if (damaged_from == 0) return;
       break;
     }
@@ -264,7 +270,8 @@ std::vector<MapLoop> read_loops_of(const MapDatabase& database, const std::strin
                            .similarity = row.real(6),
                            .matches = narrow(row.integer(7)),
                            .inliers = narrow(row.integer(8))};
-        if (has_checksum(row, 9, checksum(loop))) {
+        const bool is_finite = std::isfinite(loop.score) && std::isfinite(loop.similarity);
+        if (is_finite && has_checksum(row, 9, checksum(loop))) {
           loops.push_back(loop);
         } else {
           damage.add(fmt::format("{} {}: its values differ from their checksum", table, key));
@@ -348,19 +355,20 @@ std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damag
 void for_each_place(const MapDatabase& database, const std::function<void(const MapPlace&)>& visit,
                     Damage& damage) {
   MapPlace place;
-  for_each_row(
-      database, "place", "place, session, frame, timestamp, content, checksum", damage,
-      [&](const SqlStatement& row, std::int64_t key) {
-        place.id = key;
-        place.at = session_frame(row, 1);
-        place.timestamp_s.reset();
-        if (!row.is_null(3)) place.timestamp_s = row.real(3);
-        if (read_content(row.bytes(4), place.content) && has_checksum(row, 5, checksum_of(place))) {
-          visit(place);
-        } else {
-          damage.add(fmt::format("place {}: its content differs from its checksum", key));
-        }
-      });
+  for_each_row(database, "place", "place, session, frame, timestamp, content, checksum", damage,
+               [&](const SqlStatement& row, std::int64_t key) {
+                 place.id = key;
+                 place.at = session_frame(row, 1);
+                 place.timestamp_s.reset();
+                 if (!row.is_null(3)) place.timestamp_s = row.real(3);
+                 const bool is_finite = std::isfinite(place.timestamp_s.value_or(0.0));
+                 if (is_finite && read_content(row.bytes(4), place.content) &&
+                     has_checksum(row, 5, checksum_of(place))) {
+                   visit(place);
+                 } else {
+                   damage.add(fmt::format("place {}: its content differs from its checksum", key));
+                 }
+               });
 }
 
 std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage) {
@@ -519,6 +527,14 @@ void remove_place(const MapDatabase& database, std::int64_t place) {
     row->bind(1, place);
     row->step();
   }
+  const auto left = database.prepare("SELECT session FROM place WHERE place = ?1");
+  left->bind(1, place);
+  if (!left->step()) return;
+  throw Error(
+      ErrorKind::output,
+      fmt::format("'{}' does not let this user remove a place of session {}: only its owner "
+                  "may.",
+                  database.path(), left->integer(0)));
 }
 
 void reject_loop(const MapDatabase& database, const SessionFrame& query,

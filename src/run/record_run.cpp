@@ -14,6 +14,7 @@
 #include "loopbit/finished_run.hpp"
 #include "loopbit/gray_image.hpp"
 #include "loopbit/image_file.hpp"
+#include "loopbit/map_server.hpp"
 #include "loopbit/picture_jpeg.hpp"
 
 #include "depth_folder.hpp"
@@ -93,14 +94,16 @@ void check(const RunRequest& request, const RunInput& input, const FramesRead& f
 
 RunRecord record_of(const RunInput& input, const RunRequest& request) {
   const std::string truth = request.scoring.description();
+  std::vector<std::string> arguments = request.arguments;
+  std::transform(arguments.begin(), arguments.end(), arguments.begin(), without_secrets);
   return {.input = input.input(),
           .description = input.description(),
           .options = request.options,
           .sampling = input.sampling(),
           .threads = request.threads,
-          .map_path = request.map,
+          .map_path = without_secrets(request.map),
           .stopped_by = kRunning,
-          .arguments = request.arguments,
+          .arguments = arguments,
           .camera = request.camera ? request.camera_file : "",
           .odometry = request.odometry,
           .truth = truth.empty() ? request.truth_description : truth};
@@ -213,8 +216,7 @@ RunFolder make_folder(const RunInput& input, const RunRequest& request, int map_
   inputs.insert(inputs.end(), {input.input(), scoring.truth, scoring.not_false, scoring.ignore,
                                request.poses, request.mask, request.camera_file, request.odometry});
   if (!request.folder.empty()) return {request.folder, request.overwrite, inputs};
-  const auto stem = std::filesystem::path(request.map).replace_extension().string();
-  const std::string folder = fmt::format("{}_session_{}", stem, map_session);
+  const std::string folder = fmt::format("{}_session_{}", map_stem(request.map), map_session);
   return {folder, request.overwrite || is_unanswered(folder), inputs};
 }
 

@@ -17,6 +17,19 @@ namespace loopbit {
 /// through this interface; what differs between databases is behind it. For one thread at a time.
 class MapDatabase {
  public:
+  enum class Access {
+    read,
+    write,  ///< for new sessions
+    link,   ///< for new loops of earlier sessions, by one program at a time
+  };
+
+  /// A session that begins.
+  struct NewSession {
+    int session = 0;
+    /// Whether all earlier sessions are whole, so that its frames are compared with all of theirs.
+    bool is_linked = true;
+  };
+
   /// Is rolled back unless end() is called.
   class Transaction {
    public:
@@ -46,13 +59,23 @@ class MapDatabase {
 
   [[nodiscard]] virtual std::unique_ptr<SqlStatement> prepare(const std::string& sql) const = 0;
 
+  /// How many rows a statement should give at most, since they may all be held in memory.
+  [[nodiscard]] virtual std::int64_t rows_at_once() const = 0;
+
+  /// As long as it lives, all that is read was committed before.
+  [[nodiscard]] virtual std::unique_ptr<Transaction> snapshot() const = 0;
+
   /// Begins to write. Throws Error (kind output).
   [[nodiscard]] virtual std::unique_ptr<Transaction> begin() const = 0;
 
   /// Call this before a transaction with many rows, so that readers need not wait for it.
   virtual void prepare_long_transaction() const = 0;
 
-  /// The numbers of new sessions, ascending.
+  /// Begins a session, which counts as being written until this database is gone. What is read by
+  /// a snapshot that is taken later is all that the session's frames are compared with.
+  [[nodiscard]] virtual NewSession begin_session() const = 0;
+
+  /// The numbers of new sessions, ascending, which are written in one transaction.
   [[nodiscard]] virtual std::vector<int> new_sessions(std::size_t number) const = 0;
 
   /// The key of a place that is added after the one with the key `previous`; 0 = the first to be

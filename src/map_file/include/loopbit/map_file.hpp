@@ -112,9 +112,13 @@ class MapReader : public MapStorage {
   /// are missing or differ from their checksum".
   [[nodiscard]] const std::vector<std::string>& damage() const;
 
-  /// The faults that SQLite's integrity_check finds in the file.
+  /// The size on disk.
+  [[nodiscard]] std::int64_t bytes() const;
+
+  /// The faults that SQLite's integrity_check finds in the file. None of a map on a server.
   [[nodiscard]] std::vector<std::string> check_structure() const;
 
+  /// Of a map on a server, the address without passwords.
   [[nodiscard]] const std::string& path() const;
 
   void check_options(const LoopDetectorOptions& options) override;

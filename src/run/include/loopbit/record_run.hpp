@@ -29,10 +29,12 @@ struct RunRequest {
   int threads = 1;                          ///< for run.json
   std::vector<std::string> arguments = {};  ///< of the command line, for run.json
 
-  std::string folder = {};  ///< empty = beside the map, "town_session_2" for session 2 of "town.db"
-  bool overwrite = false;   ///< an earlier run in the folder
-  bool evidence = true;     ///< store what write_report() shows
-  std::string map = {};     ///< the map to continue or to make; empty = none
+  /// Empty = beside the map, "town_session_2" for session 2 of "town.db"; in the working folder for
+  /// session 2 of the database "town" on a server.
+  std::string folder = {};
+  bool overwrite = false;    ///< an earlier run in the folder
+  bool evidence = true;      ///< store what write_report() shows
+  std::string map = {};      ///< the map to continue or to make; empty = none
   bool keep_images = false;  ///< a small picture of each place in the map
   std::size_t map_cache_mb = kMapCache_mb;
 

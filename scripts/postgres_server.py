@@ -1,0 +1,88 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""A PostgreSQL server of its own, for tests and benchmarks: in a temporary folder, on a Unix socket and a
+free port of 127.0.0.1, by a user without privileges."""
+
+import contextlib
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import subprocess
+import tempfile
+
+PASSWORD = "p%3Aw@rd/1"    # every letter of it has to be encoded in an address
+ENCODED_PASSWORD = "p%253Aw%40rd%2F1"
+
+
+def programs():
+    """The folder of the newest installed server."""
+    found = sorted(pathlib.Path("/usr/lib/postgresql").glob("*/bin/initdb"))
+    if not found:
+        raise SystemExit("PostgreSQL is not installed; scripts/setup test installs postgresql-15.")
+    return found[-1].parent
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+class PostgresServer:
+    """A running server, whose superuser is "admin". With `safe`, commits are on disk."""
+
+    def __init__(self, safe=False):
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="loopbit_pg_"))
+        self.data = self.folder / "data"
+        self.port = free_port()
+        self.process = None
+        self.as_nobody = {}
+        if os.geteuid() == 0:
+            shutil.chown(self.folder, "nobody", "nogroup")
+            self.as_nobody = {"user": "nobody", "group": "nogroup", "extra_groups": []}
+        password = self.folder / "password"
+        password.write_text(PASSWORD)
+        password.chmod(0o644)
+        self.call("initdb", "-D", self.data, "-U", "admin", "--pwfile", password, "-A", "scram-sha-256",
+                  "-E", "UTF8", "--locale=C", "--no-sync")
+        with (self.data / "postgresql.conf").open("a") as settings:
+            settings.write(f"listen_addresses = '127.0.0.1'\nport = {self.port}\n"
+                           f"unix_socket_directories = '{self.folder}'\n"
+                           f"fsync = {'on' if safe else 'off'}\n")
+        self.start()
+
+    def call(self, program, *arguments):
+        """Runs one of the server's programs."""
+        subprocess.run([programs() / program, *map(str, arguments)], check=True, cwd=self.folder,
+                       stdout=subprocess.DEVNULL, **self.as_nobody)
+
+    def start(self):
+        self.call("pg_ctl", "-D", self.data, "-l", self.folder / "log", "-w", "-t", "60", "start")
+
+    def kill(self):
+        """As a crash of the machine would."""
+        postmaster = int((self.data / "postmaster.pid").read_text().splitlines()[0])
+        os.kill(postmaster, signal.SIGKILL)
+
+    def address(self, database, user="admin", password=ENCODED_PASSWORD):
+        secret = f":{password}" if password else ""
+        return f"postgresql://{user}{secret}@127.0.0.1:{self.port}/{database}"
+
+    def sql(self, database, *statements):
+        """What the statements print, without headings."""
+        commands = [part for statement in statements for part in ("-c", statement)]
+        return subprocess.run(["psql", "-X", "-q", "-A", "-t", "-v", "ON_ERROR_STOP=1", *commands,
+                               self.address(database)], check=True, capture_output=True, text=True).stdout
+
+    def close(self):
+        with contextlib.suppress(subprocess.CalledProcessError):
+            self.call("pg_ctl", "-D", self.data, "-m", "immediate", "-w", "stop")
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()

@@ -1,0 +1,226 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "connection.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "loopbit/error.hpp"
+
+namespace loopbit {
+namespace {
+
+constexpr int kBinary = 1;
+
+/// Network byte order, which is big-endian.
+std::string big_endian(std::uint64_t value) {
+  std::string bytes(sizeof value, '\0');
+  for (std::size_t i = 0; i < sizeof value; ++i) {
+    bytes[i] = static_cast<char>(value >> (56U - 8U * i));
+  }
+  return bytes;
+}
+
+std::span<const unsigned char> value_in(const PGresult& result, int row, int column) {
+  return {reinterpret_cast<const unsigned char*>(PQgetvalue(&result, row, column)),
+          static_cast<std::size_t>(PQgetlength(&result, row, column))};
+}
+
+std::uint64_t from_big_endian(std::span<const unsigned char> bytes) {
+  std::uint64_t value = 0;
+  for (const unsigned char byte : bytes) value = value << 8U | byte;
+  return value;
+}
+
+/// libpq's messages have several lines.
+std::string one_line(const char* message) {
+  std::string text = message ? message : "";
+  std::replace_if(
+      text.begin(), text.end(), [](char c) { return c == '\n' || c == '\t'; }, ' ');
+  text.erase(text.find_last_not_of(' ') + 1);
+  return text.empty() ? "out of memory" : text;
+}
+
+/// The clause that ends the sentence of an error, by its SQLSTATE (PostgreSQL 15, appendix A).
+std::string remedy_for(std::string_view state, const std::string& shown) {
+  if (state == "42501") {
+    return "the map's owner may GRANT loopbit_reader TO the user, or loopbit_writer for sessions "
+           "of "
+           "its own; docs/fleet.md says who may make a map";
+  }
+  if (state == "42P01" || state == "42703" || state == "3F000") {
+    return fmt::format(
+        "its tables are no map; 'loopbit map create {}' makes one in another database", shown);
+  }
+  if (state.starts_with("53")) return "free space or memory on the server, then run again";
+  if (state.starts_with("22") || state.starts_with("23")) {
+    return "the server refuses these rows; 'loopbit map check' says whether their source is "
+           "damaged";
+  }
+  if (state.starts_with("40")) return "another program changed the same rows; run again";
+  if (state.empty() || state.starts_with("08") || state.starts_with("57")) {
+    return "check that the server runs and can be reached; what was committed before is kept";
+  }
+  return "the log of the server may say more";
+}
+
+/// Such as "host=... connect_timeout=10": a robot should not wait for minutes.
+constexpr const char* kConnectTimeout_s = "10";
+
+PGconn* connect(const Address& address) {
+  // What the address says comes later, and so it counts.
+  std::vector<const char*> names{"client_encoding", "fallback_application_name"};
+  std::vector<const char*> values{"UTF8", "loopbit"};
+  if (!std::getenv("PGCONNECT_TIMEOUT")) {
+    names.push_back("connect_timeout");
+    values.push_back(kConnectTimeout_s);
+  }
+  names.insert(names.end(), {"dbname", nullptr});
+  values.insert(values.end(), {address.uri().c_str(), nullptr});
+  constexpr int kExpandAddress = 1;
+  return PQconnectdbParams(names.data(), values.data(), kExpandAddress);
+}
+
+}  // namespace
+
+Parameter parameter(std::int64_t value) { return big_endian(static_cast<std::uint64_t>(value)); }
+
+std::int64_t integer_in(const PGresult& result, int row, int column) {
+  const auto bytes = value_in(result, row, column);
+  const std::uint64_t value = from_big_endian(bytes);
+  switch (bytes.size()) {
+    case 1:  // a bool
+      return static_cast<std::int64_t>(value);
+    case sizeof(std::int32_t):
+      return static_cast<std::int32_t>(value);
+    case sizeof(std::int64_t):
+      return static_cast<std::int64_t>(value);
+    default:
+      return 0;
+  }
+}
+
+Connection::Connection(const Address& address, MapDatabase::Access access)
+    : shown_(address.shown()), access_(access), handle_(connect(address)) {
+  if (PQstatus(handle_.get()) != CONNECTION_OK) {
+    fail(one_line(PQerrorMessage(handle_.get())),
+         "check the address and the user, and that the server runs; passwords are best kept in "
+         "~/.pgpass");
+  }
+  PQsetNoticeProcessor(
+      handle_.get(), [](void*, const char*) {}, nullptr);
+  execute("SET search_path = loopbit, pg_temp");
+  if (access == MapDatabase::Access::read) execute("SET default_transaction_read_only = on");
+}
+
+Result Connection::execute(const std::string& sql) const {
+  return checked(PQexec(handle_.get(), sql.c_str()));
+}
+
+Result Connection::run(const std::string& sql, const std::vector<Parameter>& parameters) const {
+  auto found = prepared_.find(sql);
+  const auto size = static_cast<int>(parameters.size());
+  if (found == prepared_.end()) {
+    const std::string name = fmt::format("s{}", prepared_.size());
+    checked(PQprepare(handle_.get(), name.c_str(), sql.c_str(), size, nullptr));
+    found = prepared_.emplace(sql, name).first;
+  }
+  std::vector<const char*> values;
+  std::vector<int> sizes;
+  for (const Parameter& value : parameters) {
+    values.push_back(value ? value->data() : nullptr);
+    sizes.push_back(value ? static_cast<int>(value->size()) : 0);
+  }
+  const std::vector<int> formats(parameters.size(), kBinary);
+  return checked(PQexecPrepared(handle_.get(), found->second.c_str(), size, values.data(),
+                                sizes.data(), formats.data(), kBinary));
+}
+
+std::int64_t Connection::integer(const std::string& sql,
+                                 const std::vector<Parameter>& parameters) const {
+  const Result result = run(sql, parameters);
+  return PQntuples(result.get()) > 0 ? integer_in(*result, 0, 0) : 0;
+}
+
+void Connection::refuse(const std::string& why) const {
+  throw Error(ErrorKind::input, fmt::format("'{}' {}.", shown_, why));
+}
+
+Result Connection::checked(PGresult* answer) const {
+  Result result(answer);
+  const ExecStatusType status = PQresultStatus(answer);
+  if (status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK || status == PGRES_EMPTY_QUERY) {
+    return result;
+  }
+  const char* state = PQresultErrorField(answer, PG_DIAG_SQLSTATE);
+  const char* message = PQresultErrorField(answer, PG_DIAG_MESSAGE_PRIMARY);
+  fail(one_line(message ? message : PQerrorMessage(handle_.get())),
+       remedy_for(state ? state : "", shown_));
+}
+
+void Connection::fail(const std::string& reason, const std::string& remedy) const {
+  const bool reads = access_ == MapDatabase::Access::read;
+  throw Error(reads ? ErrorKind::input : ErrorKind::output,
+              fmt::format("'{}' cannot be {} ({}): {}.", shown_, reads ? "read" : "written", reason,
+                          remedy));
+}
+
+FleetStatement::FleetStatement(const Connection& connection, std::string sql)
+    : connection_(connection), sql_(std::move(sql)) {
+  std::replace(sql_.begin(), sql_.end(), '?', '$');
+}
+
+void FleetStatement::set(int number, Parameter value) {
+  const auto size = static_cast<std::size_t>(number);
+  if (parameters_.size() < size) parameters_.resize(size);
+  parameters_[size - 1] = std::move(value);
+}
+
+void FleetStatement::bind(int number, std::int64_t value) { set(number, parameter(value)); }
+
+void FleetStatement::bind(int number, double value) {
+  set(number, big_endian(std::bit_cast<std::uint64_t>(value)));
+}
+
+void FleetStatement::bind(int number, std::span<const unsigned char> bytes) {
+  set(number, std::string(bytes.begin(), bytes.end()));
+}
+
+void FleetStatement::bind(int number, std::string_view text) { set(number, std::string(text)); }
+
+void FleetStatement::bind_null(int number) { set(number, std::nullopt); }
+
+bool FleetStatement::step() {
+  if (result_) {
+    ++row_;
+  } else {
+    result_ = connection_.run(sql_, parameters_);
+    row_ = 0;
+  }
+  return row_ < PQntuples(result_.get());
+}
+
+std::int64_t FleetStatement::integer(int column) const {
+  return integer_in(*result_, row_, column);
+}
+
+double FleetStatement::real(int column) const {
+  const auto value = bytes(column);
+  return value.size() == sizeof(double) ? std::bit_cast<double>(from_big_endian(value)) : 0.0;
+}
+
+bool FleetStatement::is_null(int column) const {
+  return PQgetisnull(result_.get(), row_, column) != 0;
+}
+
+std::span<const unsigned char> FleetStatement::bytes(int column) const {
+  return value_in(*result_, row_, column);
+}
+
+}  // namespace loopbit

@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <libpq-fe.h>
+
+#include "loopbit/map_database.hpp"
+#include "loopbit/sql_statement.hpp"
+
+#include "address.hpp"
+
+namespace loopbit {
+
+struct ClearResult {
+  void operator()(PGresult* result) const { PQclear(result); }
+};
+using Result = std::unique_ptr<PGresult, ClearResult>;
+
+/// The value of a parameter in PostgreSQL's binary format; none = NULL.
+using Parameter = std::optional<std::string>;
+Parameter parameter(std::int64_t value);
+
+/// The number in a column of a row; 0 if it has none.
+std::int64_t integer_in(const PGresult& result, int row, int column);
+
+/// A connection to a PostgreSQL server. Every failure is an Error that names the server and a
+/// remedy. Values from outside are only sent as parameters, never as part of a statement.
+class Connection {
+ public:
+  Connection(const Address& address, MapDatabase::Access access);
+
+  /// Runs statements. The result is that of the last one.
+  Result execute(const std::string& sql) const;
+
+  /// Runs a statement with parameters $1, $2 and so on, which is prepared on its first use.
+  Result run(const std::string& sql, const std::vector<Parameter>& parameters) const;
+
+  /// The first column of the first row; 0 if there is none.
+  [[nodiscard]] std::int64_t integer(const std::string& sql,
+                                     const std::vector<Parameter>& parameters = {}) const;
+
+  /// The address without passwords.
+  [[nodiscard]] const std::string& shown() const { return shown_; }
+
+  /// Throws Error (kind input) with a clause on the map.
+  [[noreturn]] void refuse(const std::string& why) const;
+
+ private:
+  struct Finish {
+    void operator()(PGconn* connection) const { PQfinish(connection); }
+  };
+
+  Result checked(PGresult* answer) const;
+  [[noreturn]] void fail(const std::string& reason, const std::string& remedy) const;
+
+  std::string shown_;
+  MapDatabase::Access access_;
+  std::unique_ptr<PGconn, Finish> handle_;
+  mutable std::map<std::string, std::string> prepared_;  ///< names by statement
+};
+
+/// A statement with parameters ?1, ?2 and so on. All of its rows are in memory.
+class FleetStatement final : public SqlStatement {
+ public:
+  FleetStatement(const Connection& connection, std::string sql);
+
+  void bind(int number, std::int64_t value) override;
+  void bind(int number, double value) override;
+  void bind(int number, std::span<const unsigned char> bytes) override;
+  void bind(int number, std::string_view text) override;
+  void bind_null(int number) override;
+
+  bool step() override;
+  Step step_if_readable() override { return step() ? Step::row : Step::end; }
+  void reset() override { result_.reset(); }
+
+  [[nodiscard]] std::int64_t integer(int column) const override;
+  [[nodiscard]] double real(int column) const override;
+  [[nodiscard]] bool is_null(int column) const override;
+  [[nodiscard]] std::span<const unsigned char> bytes(int column) const override;
+
+ private:
+  void set(int number, Parameter value);
+
+  const Connection& connection_;
+  std::string sql_;
+  std::vector<Parameter> parameters_;
+  Result result_;  ///< null before the first step
+  int row_ = 0;
+};
+
+}  // namespace loopbit

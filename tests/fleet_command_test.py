@@ -1,0 +1,238 @@
+#!/usr/bin/env python3
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""Maps on a PostgreSQL server, which this starts: the command, and the program fleet_map_test.
+
+    fleet_command_test.py LOOPBIT FLEET_MAP_TEST [--quick] [unittest arguments]
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import unittest
+
+FLEET_MAP_TEST = sys.argv.pop(2)
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "scripts"))
+
+from loopbit_command import FRAMES, QUICK, CommandTest, decisions, loopbit    # noqa: E402
+from postgres_server import ENCODED_PASSWORD, PASSWORD, PostgresServer    # noqa: E402
+
+HALF = FRAMES // 2
+
+
+def without(text, *names):
+    for name in names:
+        text = text.replace(str(name), "MAP")
+    return text
+
+
+class FleetTest(CommandTest):
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        cls.server = PostgresServer()
+        cls.addClassCleanup(cls.server.close)
+        cls.server.sql("postgres", "CREATE DATABASE town", "CREATE DATABASE copy", "CREATE DATABASE empty",
+                       "CREATE DATABASE cpp")
+        cls.town = cls.server.address("town")
+        created = loopbit("map", "create", cls.town)
+        assert created.returncode == 0, created.stderr
+        for role, rights in (("robot1", "loopbit_writer"), ("robot2", "loopbit_writer"),
+                             ("viewer", "loopbit_reader"), ("stranger", None)):
+            cls.server.sql("town", f"CREATE ROLE {role} LOGIN PASSWORD '{PASSWORD}'")
+            if rights:
+                cls.server.sql("town", f"GRANT {rights} TO {role}")
+        cls.robot = cls.server.address("town", "robot1")
+        cls.file = cls.shared / "town.db"
+        cls.fleet = cls.shared / "fleet"
+        cls.fleet.mkdir()
+        cls.runs = []
+        images = sorted(cls.images.iterdir())
+        for name, files in (("first", images[:HALF]), ("second", images[HALF:])):
+            folder = cls.shared / name
+            folder.mkdir()
+            for file in files:
+                (folder / file.name).symlink_to(file)
+            for map_path in (cls.file, cls.robot):
+                ran = loopbit("run", folder, "--map", map_path, "--no-report", cwd=cls.fleet)
+                assert ran.returncode == 0, ran.stderr
+                cls.runs.append(ran)
+
+    def lines(self, *arguments):
+        ran = loopbit(*arguments)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertEqual(ran.stderr, "")
+        return ran.stdout.splitlines()
+
+    def test_program(self):
+        environment = {**os.environ, "LOOPBIT_FLEET_ADDRESS": self.server.address("cpp")}
+        ran = subprocess.run([FLEET_MAP_TEST], env=environment, capture_output=True, text=True)
+        self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
+
+    def test_runs_answer_as_with_a_file(self):
+        shown = self.server.address("town", "robot1", None)
+        for session in (1, 2):
+            of_file = decisions(self.shared / f"town_session_{session}")
+            self.assertEqual(decisions(self.fleet / f"town_session_{session}"), of_file)
+        self.assertIn(f"{shown}, session 2", self.runs[3].stdout)
+        loops = [row for row in of_file if row["status"] == "loop"]
+        self.assertTrue(QUICK or any(row["match"].startswith("1:") for row in loops))
+
+    def test_passwords_are_not_written(self):
+        for ran in self.runs:
+            self.assertNotIn("p%253A", ran.stdout + ran.stderr)
+        for folder in self.fleet.glob("town_session_*"):
+            for file in folder.rglob("*"):
+                if file.is_file():
+                    data = file.read_bytes()
+                    self.assertNotIn(PASSWORD.encode(), data, file)
+                    self.assertNotIn(ENCODED_PASSWORD.encode(), data, file)
+        record = json.loads((self.fleet / "town_session_2/run.json").read_text())
+        shown = self.server.address("town", "robot1", None)
+        self.assertEqual(record["map"], {"path": shown, "session": 2})
+        self.assertIn(shown, record["arguments"])
+
+    def test_queries_and_exports_answer_as_of_a_file(self):
+        viewer = self.server.address("town", "viewer")
+        shown = self.server.address("town", "viewer", None)
+        image = sorted(self.images.iterdir())[3]
+        self.assertEqual(self.lines("query", viewer, image, "--json"),
+                         self.lines("query", self.file, image, "--json"))
+        for form in ("csv", "g2o"):
+            self.assertEqual(self.lines("map", "export", viewer, "--format", form),
+                             self.lines("map", "export", self.file, "--format", form))
+        self.assertEqual(self.lines("map", "check", viewer), self.lines("map", "check", self.file))
+        info, of_file = ["\n".join(self.lines("map", "info", path, "--json"))
+                         for path in (viewer, self.file)]
+        info, of_file = json.loads(info), json.loads(of_file)
+        self.assertEqual(info.pop("path"), shown)
+        self.assertGreater(info.pop("bytes"), 1e5)
+        del of_file["path"], of_file["bytes"]
+        self.assertEqual(info, of_file)
+        self.assertIn(shown, self.lines("map", "info", viewer)[0])
+        self.assertEqual(len(self.lines("map", "list", viewer)), 3)
+
+    def test_maps_move_between_files_and_servers(self):
+        copy = self.server.address("copy")
+        self.lines("map", "create", copy)
+        self.assertEqual(self.lines("map", "create", copy),
+                         [f"exists     {self.server.address('copy', password=None)}"])
+        back = self.scratch / "back.db"
+        merged = self.lines("map", "merge", copy, self.file)
+        self.assertEqual(without(merged[0], self.file), without(
+            self.lines("map", "merge", back, copy)[0], self.server.address("copy", password=None)))
+        self.assertIn("2 sessions were already there", self.lines("map", "merge", back, self.file)[0])
+        for command in ("export", "list", "check"):
+            expected = self.lines("map", command, self.file)
+            self.assertEqual(self.lines("map", command, copy), expected)
+            self.assertEqual(self.lines("map", command, back), expected)
+        self.assertIn("2 sessions", self.lines("map", "merge", copy, self.town)[0])
+        self.assertIn("linked     2 sessions", self.lines("map", "link", copy)[0])
+        self.server.sql("copy", "DROP SCHEMA loopbit CASCADE")
+
+    def test_faults_are_told_with_a_remedy(self):
+        def fails(code, words, *arguments):
+            ran = loopbit(*arguments, cwd=self.scratch)
+            self.assert_fails(ran, code, *words)
+            self.assertNotIn("secret", ran.stdout + ran.stderr)
+            self.assertEqual(list(self.scratch.iterdir()), [])
+
+        run = ["run", self.images, "--no-report", "--map"]
+        dead = "postgresql://robot1:secret@127.0.0.1:1/town"
+        fails(3, ["robot1@127.0.0.1:1/town", "refused", "server runs"], "map", "info", dead)
+        fails(4, ["robot1@127.0.0.1:1/town", "refused", "server runs"], *run, dead)
+        wrong = self.server.address("town", "robot1", "secret")
+        fails(3, ["password authentication failed", "~/.pgpass"], "query", wrong, self.images)
+        fails(3, ['database "nowhere" does not exist'], "map", "list", self.server.address("nowhere"))
+        fails(3, ["without a map", "loopbit map create postgresql://admin@"], *run,
+              self.server.address("empty"))
+        stranger = self.server.address("town", "stranger")
+        fails(3, ["permission denied", "loopbit_reader"], "map", "info", stranger)
+        fails(4, ["permission denied", "docs/fleet.md"], "map", "create",
+              self.server.address("empty", "stranger"))
+        fails(4, ["permission denied", "loopbit_writer"], *run, self.server.address("town", "viewer"))
+        fails(2, ["not a valid address", "%40"], *run, "postgresql://robot1:sec@ret:secret@h/town")
+        fails(2, ["is on a server", "map merge"], "map", "compact", self.town, "--budget", "5")
+        fails(2, ["is on a server", "NEW.db"], "map", "check", self.file, "--recover", self.town)
+        fails(2, ["not the address of a server"], "map", "create", "town.db")
+        ran = loopbit("map", "info", dead, dead)
+        self.assertEqual(ran.returncode, 2)
+        self.assertNotIn("secret", ran.stderr)
+
+    def test_a_newer_version_is_refused(self):
+        self.server.sql("town", "INSERT INTO loopbit.migration (version) VALUES (99)")
+        try:
+            self.assert_fails(loopbit("map", "info", self.town), 3, "version 99", "newer loopbit")
+        finally:
+            self.server.sql("town", "DELETE FROM loopbit.migration WHERE version = 99")
+
+    def as_robot2(self, statement):
+        return subprocess.run(["psql", "-X", "-q", "-A", "-t", "-c", statement,
+                               self.server.address("town", "robot2")], capture_output=True, text=True)
+
+    def test_a_robot_changes_only_its_own_sessions(self):
+        before = self.lines("map", "export", self.town, "--format", "json")
+        for statement in ("UPDATE loopbit.session SET frames = 0",
+                          "DELETE FROM loopbit.place", "DELETE FROM loopbit.features",
+                          "DELETE FROM loopbit.loop", "UPDATE loopbit.linked SET checksum = 0"):
+            self.assertEqual(self.as_robot2(f"WITH done AS ({statement} RETURNING 1) "
+                                            "SELECT count(*) FROM done").stdout, "0\n", statement)
+        for statement, why in (
+                ("INSERT INTO loopbit.loop (session, frame, match_session, match_frame, score, "
+                 "similarity, matches, inliers, checksum) VALUES (1, 2, 1, 1, 1, 1, 1, 1, 1)",
+                 "row-level security"),
+                ("INSERT INTO loopbit.linked VALUES (1, 0) ON CONFLICT (session) DO UPDATE SET checksum = 1",
+                 "row-level security"),
+                ("SELECT nextval('loopbit.batch_number'); INSERT INTO loopbit.place (place, session, frame, "
+                 "content, checksum) VALUES ((1::bigint << 32) + 7777, 1, 7777, "
+                 "decode(repeat('00', 512), 'hex'), 0)", "row-level security"),
+                ("UPDATE loopbit.session SET owner = 'robot2'", "permission denied"),
+                ("UPDATE loopbit.place SET checksum = 0", "permission denied"),
+                ("INSERT INTO loopbit.batch VALUES (1000, 1000)", "permission denied"),
+                ("DELETE FROM loopbit.session", "permission denied"),
+                ("DROP TABLE loopbit.place", "must be owner"),
+                ("CREATE TABLE loopbit.mine (a int)", "permission denied")):
+            self.assertIn(why, self.as_robot2(statement).stderr, statement)
+        viewer = self.server.address("town", "viewer")
+        self.assertEqual(self.lines("map", "export", viewer, "--format", "json"), before)
+
+    def test_damaged_rows_are_left_out_by_name(self):
+        hostile = self.server.address("copy")
+        self.lines("map", "create", hostile)
+        self.lines("map", "merge", hostile, self.file)
+        checks = self.server.sql(
+            "copy", "SELECT format('ALTER TABLE %s DROP CONSTRAINT %I;', conrelid::regclass, conname) FROM "
+            "pg_constraint WHERE contype = 'c' AND connamespace = 'loopbit'::regnamespace")
+        at = "session = 1 AND frame ="
+        self.server.sql(
+            "copy", checks, f"UPDATE loopbit.place SET content = 'short' WHERE {at} 1",
+            f"UPDATE loopbit.place SET timestamp = 'NaN' WHERE {at} 2",
+            f"UPDATE loopbit.place SET checksum = checksum + 1 WHERE {at} 3",
+            f"UPDATE loopbit.place SET content = decode(repeat('00', 600000), 'hex') WHERE {at} 4",
+            "UPDATE loopbit.features SET features = 'x' WHERE place = (1::bigint << 32) + 5",
+            "UPDATE loopbit.features SET features = set_byte(features, 16, 255) WHERE place = "
+            "(1::bigint << 32) + 6",
+            "UPDATE loopbit.loop SET score = 'NaN' WHERE loop = (SELECT min(loop) FROM loopbit.loop)",
+            "UPDATE loopbit.session SET name = 'other' WHERE session = 2")
+        ran = loopbit("map", "check", hostile)
+        self.assertEqual(ran.returncode, 3)
+        first = 1 << 32
+        for clause in (*(f"place {first + frame}: its content differs from its checksum"
+                         for frame in (1, 2, 3, 4)),
+                       *(f"place {first + frame} (session 1, frame {frame}): its features are missing or "
+                         "differ" for frame in (5, 6)),
+                       *([] if QUICK else ["loop 1: its values differ from their checksum"]),
+                       "session 2: its description differs from its checksum"):
+            self.assertIn(f"damaged    {clause}", ran.stdout)
+        self.assert_fails(loopbit("run", self.images, "--map", hostile, "--out", self.out), 3, "is damaged",
+                          "--recover NEW.db")
+        new = self.scratch / "new.db"
+        self.assertEqual(loopbit("map", "check", hostile, "--recover", new).returncode, 0)
+        self.assertEqual(loopbit("map", "check", new).returncode, 0)
+        self.server.sql("copy", "DROP SCHEMA loopbit CASCADE")
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,187 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+// Maps on a PostgreSQL server. Needs the address of one in LOOPBIT_FLEET_ADDRESS, with a superuser;
+// fleet_command_test.py starts one.
+#include "loopbit/fleet_map.hpp"
+
+#include <cstdlib>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <libpq-fe.h>
+
+#include "loopbit/error.hpp"
+#include "loopbit/map_file.hpp"
+#include "loopbit/map_server.hpp"
+#include "loopbit/map_tools.hpp"
+
+#include "map_support.hpp"
+#include "test_support.hpp"
+
+namespace loopbit::test {
+namespace {
+
+class FleetMap : public ScratchTest {
+ protected:
+  static void SetUpTestSuite() { use_fleet_maps(); }
+
+  void SetUp() override {
+    ScratchTest::SetUp();
+    sql("SET client_min_messages = warning; DROP SCHEMA IF EXISTS loopbit CASCADE");
+    ASSERT_TRUE(create_map(address));
+  }
+
+  /// The first value of what the statements give.
+  std::string sql(const std::string& statements) const {
+    const std::unique_ptr<PGconn, decltype(&PQfinish)> connection(PQconnectdb(address.c_str()),
+                                                                  PQfinish);
+    const std::unique_ptr<PGresult, decltype(&PQclear)> result(
+        PQexec(connection.get(), statements.c_str()), PQclear);
+    EXPECT_LE(PQresultStatus(result.get()), PGRES_TUPLES_OK) << PQerrorMessage(connection.get());
+    return PQntuples(result.get()) > 0 ? PQgetvalue(result.get(), 0, 0) : "";
+  }
+
+  std::string address = std::getenv("LOOPBIT_FLEET_ADDRESS");
+};
+
+TEST_F(FleetMap, KeepsWhatWasWritten) {
+  add_session(address, 70, "first", std::nullopt, encode_image);
+  add_session(address, 3,
+              "s\xe9"
+              "cond \n",
+              SessionFrame{1, 5});
+  MapReader map(address);
+  ASSERT_EQ(map.sessions().size(), 2U);
+  EXPECT_EQ(map.sessions()[1].name,
+            "s\xe9"
+            "cond \n");
+  EXPECT_TRUE(map.sessions()[1].linked);
+  EXPECT_EQ(map.sessions()[0].frames, 70);
+  expect_only_true_places(map);
+  EXPECT_EQ(map.images().number, 70);
+  ASSERT_EQ(map.loops().size(), 1U);
+  EXPECT_EQ(map.loops()[0].query, (SessionFrame{2, 2}));
+  EXPECT_EQ(map.loops()[0].match, (SessionFrame{1, 5}));
+  EXPECT_GT(map.bytes(), 70 * 512);
+  EXPECT_TRUE(map.damage().empty());
+}
+
+TEST_F(FleetMap, ReadsMorePlacesThanItHoldsAtOnce) {
+  add_session(address, 2500);
+  const auto places = places_of(address);
+  ASSERT_EQ(places.size(), 2500U);
+  for (int frame = 0; frame < 2500; ++frame) {
+    EXPECT_EQ(places[static_cast<std::size_t>(frame)].at, (SessionFrame{1, frame}));
+  }
+}
+
+TEST_F(FleetMap, RobotsWriteAtOnceAndSeeWhatWasCommittedBefore) {
+  add_session(address, 5);
+  MapWriter one(address, fast_options(), "one");
+  add_frame(one, 0);
+  one.flush();
+  MapWriter two(address, fast_options(), "two");
+  add_frame(one, 1);
+  one.flush();
+  EXPECT_EQ(one.session(), 2);
+  EXPECT_EQ(two.session(), 3);
+  std::vector<SessionFrame> seen;
+  two.for_each_earlier_place(
+      [&](const SessionFrame& at, const BinaryContent&) { seen.push_back(at); });
+  EXPECT_EQ(seen.size(), 6U);  // not frame 1 of `one`
+  EXPECT_EQ(seen.back(), (SessionFrame{2, 0}));
+  add_frame(two, 0);
+  one.finish();
+  two.finish();
+  MapReader map(address);
+  ASSERT_EQ(map.sessions().size(), 3U);
+  EXPECT_TRUE(map.sessions()[1].linked);
+  EXPECT_FALSE(map.sessions()[2].linked);  // `one` went on
+  EXPECT_EQ(places_of(map).size(), 8U);
+  expect_only_true_places(map);
+}
+
+TEST_F(FleetMap, PlacesHaveTheEpochOfTheirCommit) {
+  MapWriter one(address, fast_options(), "one");
+  MapWriter two(address, fast_options(), "two");
+  for (int frame = 0; frame < 3; ++frame) {
+    for (MapWriter* writer : {&two, &one}) {
+      add_frame(*writer, frame);
+      writer->flush();
+    }
+  }
+  EXPECT_EQ(sql("SELECT string_agg(epoch || ':' || session || '.' || frame, ' ' ORDER BY epoch) "
+                "FROM loopbit.place JOIN loopbit.batch USING (batch)"),
+            "1:2.0 2:1.0 3:2.1 4:1.1 5:2.2 6:1.2");
+}
+
+TEST_F(FleetMap, RemovesAndRejects) {
+  add_session(address, 5, "first", SessionFrame{1, 0});
+  MapWriter map(address, fast_options(), "second");
+  map.for_each_earlier_place([](const SessionFrame&, const BinaryContent&) {});
+  map.for_each_earlier_loop([](const SessionFrame&, const SessionFrame&) {});
+  map.remove(1);
+  map.reject({1, 4}, {1, 0});
+  map.reject({1, 3}, {1, 2});
+  map.flush();
+  EXPECT_TRUE(map.features(1)->keypoints.empty());
+  EXPECT_TRUE(same_features(*map.features(2), few_features(2)));
+  map.finish();
+  MapReader read(address);
+  EXPECT_EQ(places_of(read).size(), 4U);
+  EXPECT_TRUE(read.loops().empty());
+  ASSERT_EQ(read.rejected_loops().size(), 2U);
+  EXPECT_EQ(read.rejected_loops()[0].query, (SessionFrame{1, 4}));
+  EXPECT_EQ(sql("SELECT count(*) FROM loopbit.features"), "4");
+}
+
+TEST_F(FleetMap, OtherSettingsAreRefused) {
+  add_session(address, 2);
+  LoopDetectorOptions other = fast_options();
+  other.surf.max_keypoints += 1;
+  expect_error(ErrorKind::option, {"surf.max_keypoints"},
+               [&] { MapWriter(address, other, "other"); });
+}
+
+TEST_F(FleetMap, ASessionThatIsWrittenIsNeitherMergedNorLinked) {
+  const std::string file = path("copy.db");
+  {
+    MapWriter map(address, fast_options(), "drive");
+    add_frame(map, 0);
+    map.flush();
+    expect_error(ErrorKind::input, {"is being written"}, [&] { merge_map(file, address); });
+    expect_error(ErrorKind::output, {"is being written"}, [&] { link_map(address); });
+    map.finish();
+  }
+  EXPECT_EQ(merge_map(file, address).places, 1);
+  EXPECT_EQ(merge_map(address, file).known, 1);
+}
+
+TEST_F(FleetMap, SecretsAreNotShown) {
+  const auto expect_shown = [](const std::string& uri, const std::string& shown) {
+    EXPECT_EQ(without_secrets("--map=" + uri), "--map=" + shown);
+  };
+  expect_shown("postgresql://u:secret@h:5433/d", "postgresql://u@h:5433/d");
+  expect_shown("postgres://u:se%40cret@h/d?sslmode=require", "postgresql://u@h/d?sslmode=require");
+  expect_shown("postgresql://h/d?user=u&password=secret&sslpassword=secret", "postgresql://u@h/d");
+  expect_shown("postgresql://h/d?p%61ssword=secret", "postgresql://h/d");
+  expect_shown("postgresql:///d?host=/tmp/a&service=fleet",
+               "postgresql://%2Ftmp%2Fa/d?service=fleet");
+  for (const char* broken : {"u:sec@ret@h/d", "u:sec/r@et@h/d", "u:1/ret@h/d", "u:%zzsecret@h/d",
+                             "h/d?secret", "h:secret/d", "h/d?nothing=secret"}) {
+    expect_shown(fmt::format("postgresql://{}", broken), "postgresql://...");
+    try {
+      const MapReader map(fmt::format("postgresql://{}", broken));
+      FAIL() << broken;
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("not a valid address"), std::string::npos);
+      EXPECT_EQ(std::string(error.what()).find("ret"), std::string::npos) << error.what();
+    }
+  }
+}
+
+}  // namespace
+}  // namespace loopbit::test
