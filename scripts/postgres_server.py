@@ -11,6 +11,7 @@ import signal
 import socket
 import subprocess
 import tempfile
+import time
 
 PASSWORD = "p%3Aw@rd/1"    # every letter of it has to be encoded in an address
 ENCODED_PASSWORD = "p%253Aw%40rd%2F1"
@@ -28,6 +29,14 @@ def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+def is_running(process):
+    try:
+        status = pathlib.Path(f"/proc/{process}/stat").read_text()
+    except FileNotFoundError:
+        return False
+    return status.rsplit(")", 1)[1].split()[0] != "Z"
 
 
 class PostgresServer:
@@ -56,15 +65,27 @@ class PostgresServer:
     def call(self, program, *arguments):
         """Runs one of the server's programs."""
         subprocess.run([programs() / program, *map(str, arguments)], check=True, cwd=self.folder,
-                       stdout=subprocess.DEVNULL, **self.as_nobody)
+                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **self.as_nobody)
 
     def start(self):
-        self.call("pg_ctl", "-D", self.data, "-l", self.folder / "log", "-w", "-t", "60", "start")
+        log = self.folder / "log"
+        try:
+            self.call("pg_ctl", "-D", self.data, "-l", log, "-w", "-t", "60", "start")
+        except subprocess.CalledProcessError as error:
+            raise RuntimeError(f"The server does not start:\n{log.read_text()}") from error
 
     def kill(self):
-        """As a crash of the machine would."""
+        """Ends all processes of the server at once."""
         postmaster = int((self.data / "postmaster.pid").read_text().splitlines()[0])
-        os.kill(postmaster, signal.SIGKILL)
+        os.kill(postmaster, signal.SIGSTOP)    # it begins no more
+        children = pathlib.Path(f"/proc/{postmaster}/task/{postmaster}/children").read_text().split()
+        for process in (postmaster, *map(int, children)):
+            os.kill(process, signal.SIGKILL)
+        while any(map(is_running, (postmaster, *children))):
+            time.sleep(0.01)
+        # Their zombies would be taken for a server that runs.
+        for lock in (self.data / "postmaster.pid", self.folder / f".s.PGSQL.{self.port}.lock"):
+            lock.unlink()
 
     def address(self, database, user="admin", password=ENCODED_PASSWORD):
         secret = f":{password}" if password else ""

@@ -9,14 +9,16 @@
 import json
 import os
 import pathlib
+import signal
 import subprocess
 import sys
+import time
 import unittest
 
 FLEET_MAP_TEST = sys.argv.pop(2)
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "scripts"))
 
-from loopbit_command import FRAMES, QUICK, CommandTest, decisions, loopbit    # noqa: E402
+from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, decisions, loopbit    # noqa: E402
 from postgres_server import ENCODED_PASSWORD, PASSWORD, PostgresServer    # noqa: E402
 
 HALF = FRAMES // 2
@@ -160,6 +162,29 @@ class FleetTest(CommandTest):
         ran = loopbit("map", "info", dead, dead)
         self.assertEqual(ran.returncode, 2)
         self.assertNotIn("secret", ran.stderr)
+
+    def test_a_server_that_crashes_costs_no_frame(self):
+        self.server.sql("postgres", "CREATE DATABASE outage")
+        address = self.server.address("outage")
+        self.lines("map", "create", address)
+        self.assertEqual(loopbit("run", self.shared / "first", "--map", address, "--out", self.out).returncode, 0)
+        out = self.scratch / "second"
+        with subprocess.Popen([LOOPBIT, "run", self.shared / "second", "--map", address, "--out", out,
+                               "--no-report", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                              text=True) as run:
+            run.stdout.readline()    # the first loop
+            run.send_signal(signal.SIGSTOP)
+            self.server.kill()
+            run.send_signal(signal.SIGCONT)
+            time.sleep(1)
+            self.server.start()
+            _, stderr = run.communicate()
+        self.assertEqual(run.returncode, 0, stderr)
+        self.assertRegex(stderr, r"was lost and reached again \d times; all frames are saved")
+        self.assertGreater(json.loads((out / "run.json").read_text())["map"]["reconnections"], 0)
+        self.assertEqual(decisions(out), decisions(self.fleet / "town_session_2"))
+        for command in ("check", "export"):
+            self.assertEqual(self.lines("map", command, address), self.lines("map", command, self.file))
 
     def test_a_newer_version_is_refused(self):
         self.server.sql("town", "INSERT INTO loopbit.migration (version) VALUES (99)")

@@ -121,6 +121,7 @@ RunRecord full_record() {
                    .threads = 3,
                    .map_session = 5,
                    .map_path = "town.db",
+                   .map_reconnections = 6,
                    .stopped_by = "interrupt",
                    .wall_s = 1.5,
                    .arguments = {"run", "images"},

@@ -231,6 +231,12 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   if (!outcome.record.early_end.empty()) {
     tell(fmt::format("loopbit: {}\n", outcome.record.early_end));
   }
+  if (const int times = outcome.record.map_reconnections; times > 0) {
+    tell(
+        fmt::format("loopbit: The server of '{}' was lost and reached again {} times; all frames "
+                    "are saved.\n",
+                    outcome.record.map_path, times));
+  }
   warn_of_damage(outcome.record.map_path, outcome.map_damage);
   const std::string report = request.evidence ? report_in(outcome.folder) : "";
   if (!report.empty()) write_report(report, {report_run(outcome.folder)}, flags.report);

@@ -107,7 +107,17 @@ std::int64_t integer_in(const PGresult& result, int row, int column) {
 }
 
 Connection::Connection(const Address& address, MapDatabase::Access access)
-    : shown_(address.shown()), access_(access), handle_(connect(address)) {
+    : address_(address), shown_(address.shown()), access_(access), handle_(connect(address)) {
+  begin();
+}
+
+void Connection::reconnect() {
+  prepared_.clear();
+  handle_.reset(connect(address_));
+  begin();
+}
+
+void Connection::begin() {
   if (PQstatus(handle_.get()) != CONNECTION_OK) {
     fail(one_line(PQerrorMessage(handle_.get())),
          "check the address and the user, and that the server runs; passwords are best kept in "
@@ -116,7 +126,7 @@ Connection::Connection(const Address& address, MapDatabase::Access access)
   PQsetNoticeProcessor(
       handle_.get(), [](void*, const char*) {}, nullptr);
   execute("SET search_path = loopbit, pg_temp");
-  if (access == MapDatabase::Access::read) execute("SET default_transaction_read_only = on");
+  if (access_ == MapDatabase::Access::read) execute("SET default_transaction_read_only = on");
 }
 
 Result Connection::execute(const std::string& sql) const {

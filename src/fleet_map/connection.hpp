@@ -48,6 +48,11 @@ class Connection {
   [[nodiscard]] std::int64_t integer(const std::string& sql,
                                      const std::vector<Parameter>& parameters = {}) const;
 
+  [[nodiscard]] bool is_lost() const { return PQstatus(handle_.get()) != CONNECTION_OK; }
+
+  /// Connects again. Statements remain valid.
+  void reconnect();
+
   /// The address without passwords.
   [[nodiscard]] const std::string& shown() const { return shown_; }
 
@@ -62,6 +67,9 @@ class Connection {
   Result checked(PGresult* answer) const;
   [[noreturn]] void fail(const std::string& reason, const std::string& remedy) const;
 
+  void begin();
+
+  Address address_;
   std::string shown_;
   MapDatabase::Access access_;
   std::unique_ptr<PGconn, Finish> handle_;

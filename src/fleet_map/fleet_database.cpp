@@ -118,6 +118,7 @@ MapDatabase::NewSession FleetDatabase::begin_session() const {
   connection_.run(kLockSession, {parameter(session)});
   const bool is_linked = connection_.integer(kCountLocked, {parameter(session - 1)}) == 0;
   numbering.end();
+  session_ = session;
   return {.session = session, .is_linked = is_linked};
 }
 
@@ -128,6 +129,12 @@ std::int64_t FleetDatabase::place_key(const SessionFrame& at, std::int64_t /*pre
 
 bool FleetDatabase::is_being_written() const {
   return connection_.integer(kCountLocked, {parameter(kMaxSession)}) > 0;
+}
+
+void FleetDatabase::reconnect() {
+  connection_.reconnect();
+  in_transaction_ = false;
+  if (session_ > 0) connection_.run(kLockSession, {parameter(session_)});
 }
 
 std::int64_t FleetDatabase::bytes() const {

@@ -35,6 +35,8 @@ class FleetDatabase final : public MapDatabase {
   [[nodiscard]] std::int64_t bytes() const override;
   [[nodiscard]] std::string fault() const override { return {}; }
   [[nodiscard]] std::vector<std::string> structure_faults() const override { return {}; }
+  [[nodiscard]] bool is_lost() const override { return connection_.is_lost(); }
+  void reconnect() override;
   void close() override {}
 
  private:
@@ -42,6 +44,7 @@ class FleetDatabase final : public MapDatabase {
 
   Connection connection_;
   mutable bool in_transaction_ = false;
+  mutable int session_ = 0;  ///< that is being written; 0 = none
 };
 
 }  // namespace loopbit

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <utility>
 
+#include "lost_server.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -72,6 +74,11 @@ std::int64_t BatchWriter::saved_frames() const {
   return saved_frames_;
 }
 
+int BatchWriter::reconnections() const {
+  const std::lock_guard lock(mutex_);
+  return reconnections_;
+}
+
 void BatchWriter::close() {
   rows_.reset();
   database_->close();
@@ -92,7 +99,7 @@ void BatchWriter::commit_batches() {
       batch.assign(pending_.begin(), pending_.end());
       changes = changes_;
       lock.unlock();
-      commit(batch, changes);
+      commit_once(batch, changes);
     } catch (...) {
       error = std::current_exception();
     }
@@ -111,14 +118,41 @@ void BatchWriter::commit_batches() {
   }
 }
 
+/// Also if the server is lost meanwhile.
+void BatchWriter::commit_once(const std::vector<AddedFrame>& batch, const Changes& changes) {
+  const auto pause = [this](std::chrono::milliseconds duration) {
+    std::unique_lock lock(mutex_);
+    return !added_.wait_for(lock, duration, [&] { return stop_; });
+  };
+  const std::int64_t frames =
+      batch.empty() ? session_.frames : batch.back().detection.frame + std::int64_t{1};
+  bool is_first_try = true;
+  const int lost = despite_lost_server(*database_, pause, [&] {
+    // Changes may be made twice.
+    const bool is_done =
+        !std::exchange(is_first_try, false) && !batch.empty() && is_committed(frames);
+    commit(is_done ? std::vector<AddedFrame>{} : batch, changes);
+  });
+  session_.frames = frames;
+  const std::lock_guard lock(mutex_);
+  reconnections_ += lost;
+}
+
+/// Whether the session has so many frames in the map.
+bool BatchWriter::is_committed(std::int64_t frames) const {
+  const auto row = database_->prepare("SELECT frames FROM session WHERE session = ?1");
+  row->bind(1, std::int64_t{session_.session});
+  return row->step() && row->integer(0) >= frames;
+}
+
 void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& changes) {
   const auto transaction = database_->begin();
   if (!rows_) rows_.emplace(*database_);
   if (!batch.empty()) {
-    const bool begins = session_.frames == 0;
-    session_.frames = batch.back().detection.frame + 1;
-    rows_->write(session_);
-    if (begins && session_.linked) rows_->write_linked(session_.session);
+    MapSession session = session_;
+    session.frames = batch.back().detection.frame + 1;
+    rows_->write(session);
+    if (session_.frames == 0 && session.linked) rows_->write_linked(session.session);
   }
   for (const AddedFrame& frame : batch) write(frame);
   for (const auto& change : changes) change(*database_);

@@ -56,6 +56,9 @@ class BatchWriter {
 
   [[nodiscard]] std::int64_t saved_frames() const;
 
+  /// How often the server was lost and reached again.
+  [[nodiscard]] int reconnections() const;
+
   /// Call this once, after flush(). Releases the lock of the map and, if nobody reads it, leaves
   /// one file without a log.
   void close();
@@ -64,6 +67,8 @@ class BatchWriter {
   using Changes = std::vector<std::function<void(const MapDatabase&)>>;
 
   void commit_batches();
+  void commit_once(const std::vector<AddedFrame>& batch, const Changes& changes);
+  [[nodiscard]] bool is_committed(std::int64_t frames) const;
   void commit(const std::vector<AddedFrame>& batch, const Changes& changes);
   void write(const AddedFrame& frame);
 
@@ -79,6 +84,7 @@ class BatchWriter {
   std::deque<AddedFrame> pending_;
   Changes changes_;
   std::int64_t saved_frames_ = 0;
+  int reconnections_ = 0;
   std::exception_ptr error_;
   bool in_a_hurry_ = false;
   bool stop_ = false;

@@ -35,6 +35,8 @@ class FileDatabase final : public MapDatabase {
   [[nodiscard]] std::int64_t bytes() const override;
   [[nodiscard]] std::string fault() const override;
   [[nodiscard]] std::vector<std::string> structure_faults() const override;
+  [[nodiscard]] bool is_lost() const override { return false; }
+  void reconnect() override {}
   void close() override;
 
  private:

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/map_file.hpp"
 
+#include <chrono>
 #include <ctime>
 #include <new>
 #include <random>
 #include <set>
+#include <thread>
 #include <utility>
 
 #include <fmt/chrono.h>
@@ -18,6 +20,7 @@
 
 #include "batch_writer.hpp"
 #include "file_database.hpp"
+#include "lost_server.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
 #include "stored_features.hpp"
@@ -205,7 +208,13 @@ class MapWriter::Impl {
   std::shared_ptr<const Features> features(PlaceId place) {
     if (auto found = stored().find(place)) return found;
     if (auto pending = writer_->pending(place - session_begin())) return pending;
-    return stored().get(place, damage_);
+    const auto pause = [](std::chrono::milliseconds duration) {
+      std::this_thread::sleep_for(duration);
+      return true;
+    };
+    std::shared_ptr<const Features> read;
+    despite_lost_server(*database_, pause, [&] { read = stored().get(place, damage_); });
+    return read;
   }
 
   void add(const Detection& detection, const BinaryContent& content,
@@ -336,6 +345,7 @@ MapWriter::Impl& MapWriter::impl() const {
 void MapWriter::check_process() const { impl_->check_process(); }
 int MapWriter::session() const { return impl().session(); }
 std::int64_t MapWriter::saved_frames() const { return impl().writer().saved_frames(); }
+int MapWriter::reconnections() const { return impl().writer().reconnections(); }
 void MapWriter::flush() { impl().writer().flush(); }
 void MapWriter::finish() { impl().finish(); }
 const std::vector<std::string>& MapWriter::damage() const { return impl().damage().clauses(); }

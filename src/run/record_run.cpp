@@ -269,7 +269,10 @@ class RecordedRun {
     if (map) map_damage_ = map->damage();
     if (poses) poses_ = poses->poses();
     if (evidence) evidence->finish();
-    if (map) map->finish();
+    if (map) {
+      map->finish();
+      record_.map_reconnections = map->reconnections();
+    }
     if (!stop && are_unreadable(folder_.detections())) {
       throw Error(ErrorKind::input, fmt::format("None of the {} frames of '{}' could be read; the "
                                                 "messages about them say why.",

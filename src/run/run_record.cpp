@@ -89,6 +89,7 @@ void transfer(Io& io, Record& record) {
   io("/machine/system", record.machine.system);
   io("/threads", record.threads);
   io.unless(std::string(), "/map/path", record.map_path);
+  io.unless(0, "/map/reconnections", record.map_reconnections);
   io.unless(0, "/map/session", record.map_session);
   io.unless(std::string(), "/camera", record.camera);
   io.unless(std::string(), "/odometry", record.odometry);

@@ -95,6 +95,13 @@ class MapDatabase {
   /// The faults of its structure. Reads all of it.
   [[nodiscard]] virtual std::vector<std::string> structure_faults() const = 0;
 
+  /// Whether a server no longer answers. Then a transaction is lost, unless end() was called: it
+  /// may have been committed or not.
+  [[nodiscard]] virtual bool is_lost() const = 0;
+
+  /// Reaches the server again, for the same statements and sessions. Throws Error if it cannot.
+  virtual void reconnect() = 0;
+
   /// Call this when all is written, and nothing is read through it any more.
   virtual void close() = 0;
 };

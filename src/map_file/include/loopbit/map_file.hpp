@@ -170,6 +170,9 @@ class MapWriter : public MapStorage {
   /// The number of committed frames of this session.
   [[nodiscard]] std::int64_t saved_frames() const;
 
+  /// How often the server of the map was lost, and its frames saved when it was back.
+  [[nodiscard]] int reconnections() const;
+
   /// Commits all frames added so far. Throws Error (kind output).
   void flush();
 

@@ -71,6 +71,7 @@ struct RunRecord {
   int threads = 1;
   int map_session = 0;        ///< session of this run, if there is a map
   std::string map_path = {};  ///< empty = none
+  int map_reconnections = 0;  ///< how often the map's server was lost and reached again
   /// "running", "end", "interrupt", or an error message. A killed run keeps "running".
   std::string stopped_by = "end";
   double wall_s = 0;  ///< reading and detecting
