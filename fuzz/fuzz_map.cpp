@@ -12,6 +12,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     map.for_each_earlier_place([](const auto&, const auto&) {});
     (void)map.images();
     (void)loopbit::export_loops(map, loopbit::ExportFormat::json);
+    (void)loopbit::export_loops(map, loopbit::ExportFormat::g2o);
+    (void)map.odometry();
     (void)map.options();
   });
   return 0;

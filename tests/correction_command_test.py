@@ -9,7 +9,7 @@ import pathlib
 import subprocess
 import unittest
 
-from loopbit_command import QUICK, CommandTest, loopbit
+from loopbit_command import FRAMES, QUICK, CommandTest, loopbit
 
 # Two storeys that look the same, a lap and a piece on each.
 STOREYS = ["--frames", 80 if QUICK else 240, "--world", f"spacing_m={4.5 if QUICK else 1.5}", "--world",
@@ -145,6 +145,70 @@ class CorrectionTest(CommandTest):
             else:
                 self.assertGreater(record["score"]["late"]["right"], 0.85 * without, fault)
         self.assertEqual([fault for fault in told if fault in (None, "jump", "clock")], ["jump", "clock"])
+
+    def test_a_map_of_one_session_is_corrected_as_its_run(self):
+        storeys, out = self.scratch / "storeys.db", self.scratch / "graph"
+        ran = loopbit("run", self.storeys, "--odometry", self.storeys / "odometry.txt", "--map", storeys,
+                      *NO_GATE, "--no-report", "--quiet")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        before = storeys.read_bytes()
+        ran = loopbit("graph", storeys, "--out", out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        rejected = [(loop["query"], loop["match"]) for loop in self.loops if loop["verdict"] != "kept"]
+        self.assertRegex(ran.stdout, rf"graph +{len(self.loops) - len(rejected)} loops kept, "
+                                     rf"{len(rejected)} rejected \(\d+ unreachable")
+        self.assertIn("--reject", ran.stdout)
+        self.assertEqual(storeys.read_bytes(), before, "it was only read")
+        for name in ("corrected.tum", "corrected.kitti"):
+            of_session = out / name.replace(".", "_1.")
+            self.assertEqual(of_session.read_bytes(), (self.corrected / name).read_bytes(), name)
+        for row in ("VERTEX_SE3:QUAT ", "EDGE_SE3:QUAT ", "#EDGE_SE3:QUAT "):
+            counts = [sum(line.startswith(row) for line in (folder / "graph.g2o").read_text().splitlines())
+                      for folder in (out, self.corrected)]
+            self.assertEqual(counts[0], counts[1], row)
+        self.assertEqual((out / "judged_loops.csv").read_text().replace("1:", ""),
+                         (self.corrected / "judged_loops.csv").read_text())
+        self.assert_fails(loopbit("graph", storeys, "--out", out), 4, out, "new folder")
+        ran = loopbit("graph", storeys, "--reject", "--json")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        told = json.loads(ran.stdout)
+        self.assertEqual([(str(loop["query"]["frame"]), str(loop["match"]["frame"]))
+                          for loop in told["rejected"]], rejected)
+        self.assertEqual(told["loops"], self.record["correction"]["loops"])
+        exported = self.scratch / "loops.csv"
+        loopbit("map", "export", storeys, "--out", exported)
+        left = [(row["query"], row["match"]) for row in table(exported)]
+        self.assertEqual(sorted(left), sorted((loop["query"], loop["match"]) for loop in self.loops
+                                              if loop["verdict"] == "kept"))
+
+    def test_sessions_of_a_map_are_corrected_together(self):
+        town, out = self.scratch / "town.db", self.scratch / "graph"
+        run = ["run", self.dataset, "--map", town, "--odometry", self.dataset / "odometry.txt", "--no-report",
+               "--quiet"]
+        for flags in (["--limit", FRAMES // 2], ["--correct"]):
+            ran = loopbit(*run, *flags)
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+        withdrawn = sum(row["kind"] == "withdrawn" for row in table(self.scratch / "town_session_2/late_loops.csv"))
+        info = json.loads(loopbit("map", "info", town, "--json").stdout)
+        self.assertEqual(info["odometry_frames"], FRAMES // 2 + FRAMES)
+        self.assertEqual(info["rejected_loops"], withdrawn, "by later frames and the graph of the run")
+        ran = loopbit("graph", town, "--out", out)
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn("sessions 1, 2 joined by loops, in the frame of session 1", ran.stdout)
+        for session, frames in ((1, FRAMES // 2), (2, FRAMES)):
+            self.assertEqual(len((out / f"corrected_{session}.tum").read_text().splitlines()), 1 + frames)
+        between = [loop for loop in table(out / "judged_loops.csv") if loop["match"].startswith("1:")
+                   and loop["query"].startswith("2:")]
+        self.assertGreater(len(between), FRAMES // 3)
+        self.assertEqual({loop["odometry_chi2"] for loop in between}, {""})
+
+    def test_a_map_without_odometry_is_refused(self):
+        town, out = self.scratch / "town.db", self.scratch / "graph"
+        ran = loopbit("run", self.images, "--limit", 5, "--map", town, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assert_fails(loopbit("graph", town, "--out", out, "--reject"), 3, town, "no odometry",
+                          "--odometry FILE")
+        self.assert_fails(loopbit("graph", self.scratch / "none.db"), 3, "no map", "none.db")
 
     def test_without_odometry_it_is_refused(self):
         self.assert_fails(loopbit("run", self.storeys, "--correct", "--out", self.out), 2, "--correct",

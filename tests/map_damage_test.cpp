@@ -36,7 +36,11 @@ class MapDamage : public ScratchTest {
   void SetUp() override {
     ScratchTest::SetUp();
     add_session(path("map.db"), kFrames - 20, "first", std::nullopt, encode_image);
-    add_session(path("map.db"), 20, "second", SessionFrame{1, 2}, encode_image);
+    MapWriter map(path("map.db"), fast_options(), "second", encode_image);
+    for (int frame = 0; frame < 19; ++frame) add_frame(map, frame);
+    add_frame(map, 19, SessionFrame{1, 2});
+    map.add_pose({.query = {0, 19}, .match = {1, 2}, .measured = motion_of(19)});
+    map.finish();
     bytes_ = read_bytes(path("map.db"));
   }
 
@@ -51,7 +55,13 @@ class MapDamage : public ScratchTest {
       for (const MapLoop& loop : map.loops()) {
         EXPECT_EQ(loop, (MapLoop{{2, 19}, {1, 2}, 0.995, 0.25, 40, 31})) << what;
       }
-      const bool whole = check.places == kFrames && check.images == kFrames && check.loops == 1 &&
+      for (const KnownMotion& motion : map.motions_of({{{2, 19}, {1, 2}}})) {
+        if (motion.known == PoseKnown::nothing) continue;
+        EXPECT_EQ(motion.motion.T_from_to, motion_of(19).motion.T_from_to) << what;
+        EXPECT_EQ(motion.motion.covariance, motion_of(19).motion.covariance) << what;
+      }
+      const bool whole = map.odometry().size() == kFrames && map.loop_poses().size() == 1 &&
+                         check.places == kFrames && check.images == kFrames && check.loops == 1 &&
                          check.sessions == 2;
       EXPECT_TRUE(whole || !check.damage.empty()) << what << " is not told";
       ++(whole ? outcomes_.whole : outcomes_.partial);
@@ -143,6 +153,8 @@ TEST_F(MapDamage, AMapWithoutItsFirstPageIsRecovered) {
   EXPECT_FALSE(fs::exists(path("recovered.db.part")));
   EXPECT_FALSE(fs::exists(path("recovered.db.part.repaired")));
   MapReader recovered(path("recovered.db"));
+  EXPECT_EQ(recovered.odometry().size(), std::size_t{kFrames});
+  EXPECT_EQ(recovered.loop_poses().size(), 1U);
   expect_only_true_places(recovered);
 }
 

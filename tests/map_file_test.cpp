@@ -303,8 +303,8 @@ TEST_F(MapFile, AMapThatMayNotBeReadIsNotCalledDamaged) {
 
 TEST_F(MapFile, ANewerVersionIsRefused) {
   add_session(map_path_, 1);
-  change(map_path_, "PRAGMA user_version = 4");
-  const auto words = {std::string_view("version 4"), std::string_view("newer loopbit")};
+  change(map_path_, "PRAGMA user_version = 5");
+  const auto words = {std::string_view("version 5"), std::string_view("newer loopbit")};
   expect_error(ErrorKind::input, words, [&] { const MapReader map(map_path_); });
   expect_error(ErrorKind::input, words,
                [&] { const MapWriter map(map_path_, fast_options(), "drive"); });

@@ -184,9 +184,7 @@ TEST_F(MapImagesTest, AMapOfVersion1IsContinuedWithImages) {
 TEST_F(MapImagesTest, AMapOfVersion1IsRecoveredWithoutItsFirstPage) {
   // A larger one, which has other rows where images begin today.
   add_session(map_path_, 120);
-  change(map_path_,
-         "DROP TABLE linked; DROP TABLE rejected; DROP TABLE image; PRAGMA user_version = 1; "
-         "VACUUM");
+  make_older(map_path_, 1);
   EXPECT_EQ(places_of(map_path_).size(), 120U);
   for (std::string bytes : {read_bytes(LOOPBIT_OLD_MAP), read_bytes(map_path_)}) {
     const auto places = static_cast<std::int64_t>(places_of(write("whole.db", bytes)).size());

@@ -22,10 +22,6 @@ namespace {
 constexpr int kScenes = 16;
 constexpr int kReadable = kScenes * 3 / 2 - 2;  ///< frames of a drive
 
-/// As a map of version 2: without its last tables.
-constexpr const char* kAsVersion2 =
-    "DROP TABLE linked; DROP TABLE rejected; PRAGMA user_version = 2";
-
 class MapLink : public ScratchTest {
  protected:
   /// One lap and a half through the scenes, some frames of which are unreadable.
@@ -139,7 +135,7 @@ TEST_F(MapLink, AStopKeepsTheSessionsThatAreDone) {
 TEST_F(MapLink, AnOlderMapGetsWhatIsMissing) {
   drive("map.db", {0, 0});
   drive("map.db", {6, 2});
-  change(path("map.db"), kAsVersion2);
+  make_older(path("map.db"), 2);
   EXPECT_FALSE(MapReader(path("map.db")).sessions()[1].linked);
   EXPECT_TRUE(MapReader(path("map.db")).rejected_loops().empty());
   change(path("map.db"), "DELETE FROM loop WHERE session = 2 AND match_session = 1 AND frame < 5");

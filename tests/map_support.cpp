@@ -8,6 +8,7 @@
 #include <iterator>
 #include <memory>
 #include <tuple>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -42,6 +43,20 @@ BinaryContent content_of(int number) {
   return random_content(random, 0.3);
 }
 
+OdometryPose odometry_of(int number) {
+  OdometryPose odometry;
+  odometry.T_odometry_camera = {0,  0, 1, 0.1 * number,       0, 1, 0, 0.3,
+                                -1, 0, 0, 1.0 / (number + 3), 0, 0, 0, 1};
+  if (number % 2 == 0) odometry.covariance = 1e-6 * (number + 1) * cv::Matx66d::eye();
+  return odometry;
+}
+
+KnownMotion motion_of(int number) {
+  return {PoseKnown::metric,
+          {odometry_of(number + 1).T_odometry_camera,
+           0.001 * number * cv::Matx66d::eye() + 0.0001 * cv::Matx66d::ones()}};
+}
+
 bool same_features(const Features& a, const Features& b) {
   const auto values = [](const Keypoint& k) {
     return std::tuple(k.x_px, k.y_px, k.scale, k.angle_rad);
@@ -65,7 +80,7 @@ std::vector<unsigned char> encode_image(const cv::Mat& image) {
 }
 
 void add_frame(MapWriter& map, int frame, std::optional<SessionFrame> loop) {
-  Detection detection{.frame = frame, .timestamp_s = 0.5 * frame};
+  Detection detection{.frame = frame, .timestamp_s = 0.5 * frame, .odometry = odometry_of(frame)};
   if (loop) {
     detection.status = Status::loop;
     detection.earlier_match = loop;
@@ -99,8 +114,19 @@ std::vector<MapPlace> places_of(const std::string& path) {
   return places_of(map);
 }
 
+/// That of frames without a covariance is tested elsewhere.
+void expect_only_true_odometry(MapReader& map) {
+  for (const MapOdometry& odometry : map.odometry()) {
+    const OdometryPose expected = odometry_of(odometry.at.frame);
+    EXPECT_EQ(odometry.timestamp_s, 0.5 * odometry.at.frame);
+    EXPECT_EQ(odometry.pose.T_odometry_camera, expected.T_odometry_camera) << odometry.at.frame;
+    EXPECT_EQ(odometry.pose.covariance, expected.covariance.value_or(*odometry.pose.covariance));
+  }
+}
+
 /// Every place is what add_session() wrote for its frame, or it is not there.
 void expect_only_true_places(MapReader& map) {
+  expect_only_true_odometry(map);
   for (const MapPlace& place : places_of(map)) {
     EXPECT_EQ(place.content, content_of(place.at.frame)) << place.id;
     EXPECT_EQ(place.timestamp_s, 0.5 * place.at.frame);
@@ -121,6 +147,16 @@ bool is_one_file(const std::string& path) {
   // sqlite.org/fileformat2.html, 1.3.3: bytes 18 and 19 are 2 where there is a log.
   return read_bytes(path).substr(18, 2) == "\1\1" && !std::filesystem::exists(path + "-wal") &&
          !std::filesystem::exists(path + "-shm");
+}
+
+void make_older(const std::string& path, int version) {
+  constexpr std::pair<int, const char*> kTables[] = {
+      {4, "odometry"}, {4, "relative_pose"}, {3, "linked"}, {3, "rejected"}, {2, "image"}};
+  std::string sql = "PRAGMA user_version = " + std::to_string(version);
+  for (const auto& [since, table] : kTables) {
+    if (since > version) sql += std::string("; DROP TABLE ") + table;
+  }
+  change(path, sql + "; VACUUM");
 }
 
 void change(const std::string& path, const std::string& sql) {

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "loopbit/binary_content.hpp"
+#include "loopbit/known_motion.hpp"
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/map_file.hpp"
+#include "loopbit/odometry.hpp"
 #include "loopbit/surf.hpp"
 
 namespace loopbit::test {
@@ -23,6 +25,12 @@ BinaryContent content_of(int number);
 
 /// Three features of frame `number`.
 Features few_features(int number);
+
+/// The odometry of frame `number`. Even frames have a covariance.
+OdometryPose odometry_of(int number);
+
+/// The relative pose of a loop of frame `number`.
+KnownMotion motion_of(int number);
 
 bool same_features(const Features& a, const Features& b);
 
@@ -43,8 +51,8 @@ void add_session(const std::string& path, int frames, const std::string& name = 
 std::vector<MapPlace> places_of(MapReader& map);
 std::vector<MapPlace> places_of(const std::string& path);
 
-/// Expects every place to be what add_frame() wrote for its frame, with its features and image
-/// or without.
+/// Expects every place and its odometry to be what add_frame() wrote for its frame, with its
+/// features and image or without.
 void expect_only_true_places(MapReader& map);
 
 std::string read_bytes(const std::string& path);
@@ -52,6 +60,9 @@ std::string read_bytes(const std::string& path);
 /// Whether the map is in the file alone, which can be read without the right to write: it has no
 /// log, and its header asks for none.
 bool is_one_file(const std::string& path);
+
+/// Makes a map one of an earlier version, without the tables that it lacks.
+void make_older(const std::string& path, int version);
 
 /// Changes a SQLite file, made if there is none, as no map of ours is changed.
 void change(const std::string& path, const std::string& sql);

@@ -140,7 +140,7 @@ TEST_F(MapThreads, PendingFeaturesAreGivenWhileTheyAreCommitted) {
   loopbit::MapSession session;
   session.session = 1;
   BatchWriter writer(std::make_unique<FileDatabase>(open_map_for_writing(map_path)),
-                     std::move(session), 1, {});
+                     std::move(session), 1, {}, {});
   std::vector<std::shared_ptr<const Features>> added;
   int pending = 0;
   for (int frame = 0; frame < kFrames; ++frame) {

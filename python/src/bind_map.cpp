@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -44,6 +45,30 @@ struct LoopRow {
   int matches;
   int inliers;
 };
+
+/// A row of odometry().
+struct OdometryRow {
+  int session;
+  int frame;
+  double timestamp_s;
+  std::array<std::array<double, 4>, 4> pose;
+  std::array<std::array<double, 6>, 6> covariance;
+};
+
+std::vector<OdometryRow> odometry_of(MapReader& map) {
+  std::vector<OdometryRow> rows;
+  for (const MapOdometry& odometry : map.odometry()) {
+    OdometryRow& row = rows.emplace_back(OdometryRow{odometry.at.session,
+                                                     odometry.at.frame,
+                                                     odometry.timestamp_s.value_or(std::nan("")),
+                                                     {},
+                                                     {}});
+    const cv::Matx66d covariance = odometry.pose.covariance.value_or(cv::Matx66d::zeros());
+    std::copy_n(odometry.pose.T_odometry_camera.val, 16, row.pose.front().data());
+    std::copy_n(covariance.val, 36, row.covariance.front().data());
+  }
+  return rows;
+}
 
 std::vector<PlaceRow> places_of(MapReader& map) {
   std::vector<PlaceRow> rows;
@@ -184,7 +209,14 @@ void bind_reader(py::module_& module) {
           "inliers.")
       .def(
           "rejected_loops", [](SharedReader& self) { return array_of(self, rejected_loops_of); },
-          "All undamaged loops that LoopDetector.reject() withdrew, in the form of loops().")
+          "All undamaged loops that LoopDetector.reject() or a pose graph withdrew, in the form of "
+          "loops().")
+      .def(
+          "odometry", [](SharedReader& self) { return array_of(self, odometry_of); },
+          "The undamaged odometry of all frames that have some, by session and frame: structured "
+          "array of session, frame, timestamp_s (nan if there is none), pose (4 x 4: x_odometry = "
+          "pose x_camera, in metres) and covariance (6 x 6: of the motion since the frame with "
+          "odometry before, with the conventions of RelativePose).")
       .def("features_of", &features_of, py::arg("place"),
            "The features of a place, which is a row of places(); None if they are damaged.")
       .def("image_of", &image_of, py::arg("place"),
@@ -251,6 +283,7 @@ void bind_map(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(PlaceRow, id, session, frame, timestamp_s, content);
   PYBIND11_NUMPY_DTYPE(LoopRow, query_session, query_frame, match_session, match_frame, score,
                        similarity, matches, inliers);
+  PYBIND11_NUMPY_DTYPE(OdometryRow, session, frame, timestamp_s, pose, covariance);
   bind_session_frame(module);
   bind_session(module);
   py::class_<SharedMap, std::shared_ptr<SharedMap>>(

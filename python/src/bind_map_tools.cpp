@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -10,6 +12,7 @@
 #include <pybind11/stl/filesystem.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/map_graph.hpp"
 #include "loopbit/map_tools.hpp"
 
 #include "bindings.hpp"
@@ -66,10 +69,73 @@ void bind_results(py::module_& module) {
       });
 }
 
+/// The query and match of a loop.
+using LoopPair = std::pair<SessionFrame, SessionFrame>;
+
+void bind_correction(py::module_& module) {
+  py::class_<MapCorrection>(module, "MapCorrection", "The result of correct_map().")
+      .def_property_readonly(
+          "keyframes", [](const MapCorrection& self) { return self.correction.keyframes; },
+          "Number of frames with odometry.")
+      .def_property_readonly(
+          "kept", [](const MapCorrection& self) { return self.correction.kept(); },
+          "Number of loops that are kept.")
+      .def_property_readonly(
+          "unjudged", [](const MapCorrection& self) { return self.correction.unjudged; },
+          "Number of loops of frames without odometry.")
+      .def_property_readonly(
+          "rejected",
+          [](const MapCorrection& self) {
+            std::vector<LoopPair> loops;
+            for (const MapLoop& loop : self.rejected) loops.emplace_back(loop.query, loop.match);
+            return loops;
+          },
+          "Query and match of each loop that is rejected, for reject_loops().")
+      .def_property_readonly(
+          "frame_of",
+          [](const MapCorrection& self) {
+            std::map<int, int> frame_of;
+            for (const MapCorrection::Session& session : self.sessions) {
+              if (session.keyframes > 0) frame_of[session.session] = session.frame_of;
+            }
+            return frame_of;
+          },
+          "For each session with odometry, the first session that kept loops join it to, in whose "
+          "frame its corrected poses are; itself if there is none before.")
+      .def("__repr__", [](const MapCorrection& self) {
+        return fmt::format("MapCorrection(keyframes={}, kept={}, rejected={}, unjudged={})",
+                           self.correction.keyframes, self.correction.kept(), self.rejected.size(),
+                           self.correction.unjudged);
+      });
+  module.def(
+      "correct_map",
+      [](SharedReader& map, const std::optional<Path>& folder) {
+        return map.exclusively([&](MapReader& reader) {
+          return correct_map(reader, folder.value_or(Path()).string());
+        });
+      },
+      py::arg("map"), py::arg("folder") = py::none(), Free(),
+      "Solves the pose graph of all sessions of a map that have odometry. Writes the corrected "
+      "trajectories, the graph and the evidence for each loop to an existing folder, if one is "
+      "given, as loopbit graph does. The map is only read. Raises InputError if no frame has "
+      "odometry.");
+  module.def(
+      "reject_loops",
+      [](const Path& path, const std::vector<LoopPair>& pairs) {
+        std::vector<MapLoop> loops;
+        for (const auto& [query, match] : pairs) loops.push_back({.query = query, .match = match});
+        reject_loops(path.string(), loops);
+      },
+      py::arg("path"), py::arg("loops"), Free(),
+      "Withdraws loops in a map, given as pairs of query and match: they are not exported, and "
+      "later sessions do not use them.");
+}
+
 }  // namespace
 
 void bind_map_tools(py::module_& module) {
   bind_results(module);
+  bind_correction(module);
   module.def(
       "check_map", [](const Path& path) { return check_map(path.string()); }, py::arg("path"),
       Free(), "Checks a map by reading every byte. Raises InputError like MapReader.");

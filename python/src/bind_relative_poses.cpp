@@ -122,7 +122,8 @@ void bind_pose(py::module_& module) {
       .def_readonly("points", &RelativePose::points, "Inliers whose depth is known.")
       .def_readonly("rms_px", &RelativePose::rms_px,
                     "Of the inliers' residuals, in pixels of the working image.")
-      .def("to_g2o_edge", &to_g2o_edge, whole("match"), whole("query"),
+      .def("to_g2o_edge", py::overload_cast<const RelativePose&, int, int>(&to_g2o_edge),
+           whole("match"), whole("query"),
            "A line EDGE_SE3:QUAT with the information matrix as g2o defines it. What is not known "
            "has no information.")
       .def("__repr__", [](const RelativePose& self) {

@@ -67,6 +67,8 @@ void info_command(const std::string& path, bool json) {
   const std::int64_t places = sum(places_of(map));
   const std::int64_t loops = sum(loops_of(map));
   const std::size_t rejected = map.rejected_loops().size();
+  const std::size_t odometry = map.odometry().size();
+  const std::size_t poses = map.loop_poses().size();
   const MapImages images = map.images();
   const std::int64_t bytes = map.bytes();
   if (json) {
@@ -76,6 +78,8 @@ void info_command(const std::string& path, bool json) {
               {"places", places},
               {"loops", loops},
               {"rejected_loops", rejected},
+              {"odometry_frames", odometry},
+              {"relative_poses", poses},
               {"unlinked_sessions", num_unlinked(map)},
               {"images", images.number},
               {"image_bytes", images.bytes},
@@ -90,6 +94,8 @@ void info_command(const std::string& path, bool json) {
     fmt::print("\nsessions   {}\nplaces     {}\nloops      {}\n", map.sessions().size(), places,
                loops);
     if (rejected > 0) fmt::print("rejected   {} loops\n", rejected);
+    if (odometry > 0) fmt::print("odometry   {} frames\n", odometry);
+    if (poses > 0) fmt::print("poses      {} loops\n", poses);
     if (images.number > 0) {
       fmt::print("images     {}, {:.1f} MB\n", images.number,
                  static_cast<double>(images.bytes) / 1e6);

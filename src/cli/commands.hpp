@@ -33,6 +33,7 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code);
 void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code);
 void add_query(CLI::App& app, int& exit_code);
 void add_map(CLI::App& app, int& exit_code);
+void add_graph(CLI::App& app);
 void add_pairs(CLI::App& app);
 void add_eval(CLI::App& app);
 void add_compare(CLI::App& app);

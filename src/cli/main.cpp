@@ -115,6 +115,7 @@ int run_command_line(int argc, char** argv) {
   cli::add_demo(app, arguments, exit_code);
   cli::add_query(app, exit_code);
   cli::add_map(app, exit_code);
+  cli::add_graph(app);
   cli::add_pairs(app);
   cli::add_eval(app);
   cli::add_compare(app);

@@ -14,23 +14,18 @@
 #include "process.hpp"
 
 namespace loopbit::cli {
-namespace {
 
 namespace fs = std::filesystem;
 
-void make_empty_folder(const std::string& folder) {
+void make_new_folder(const std::string& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
   const bool is_empty = !error && fs::is_empty(folder, error);
   if (error) throw cannot_write(folder, error.value());
-  if (!is_empty) {
-    throw Error(
-        ErrorKind::output,
-        fmt::format("'{}' has files that images could replace; give a new folder.", folder));
-  }
+  if (is_empty) return;
+  throw Error(ErrorKind::output,
+              fmt::format("'{}' has files that could be replaced; give a new folder.", folder));
 }
-
-}  // namespace
 
 void warn_of_damage(const MapReader& map) { warn_of_damage(map.path(), map.damage()); }
 
@@ -43,7 +38,7 @@ void warn_of_damage(const std::string& path, const std::vector<std::string>& dam
 }
 
 PlaceImages::PlaceImages(MapReader& map, const std::string& folder) : map_(map), folder_(folder) {
-  make_empty_folder(folder);
+  make_new_folder(folder);
   map.for_each_place([&](const MapPlace& place) {
     images_[{place.at.session, place.at.frame}].id = place.id;
   });

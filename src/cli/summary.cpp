@@ -34,16 +34,8 @@ void print_changes(const std::vector<Detection>& detections, std::size_t rejecte
 
 /// What the pose graph made of the loops, and of the trajectory.
 void print_correction(const Correction& correction, const std::string& folder) {
-  std::string evidence;
-  for (std::size_t i = 0; i < kAllLoopVerdicts.size(); ++i) {
-    const LoopVerdict verdict = kAllLoopVerdicts[i];
-    if (verdict == LoopVerdict::kept || correction.by_verdict[i] == 0) continue;
-    evidence += fmt::format("{}{} {}", evidence.empty() ? " (" : ", ", correction.by_verdict[i],
-                            to_string(verdict));
-  }
-  if (!evidence.empty()) evidence += ')';
   fmt::print("graph      {} loops kept, {} rejected and withdrawn{}\n", correction.kept(),
-             correction.rejected(), evidence);
+             correction.rejected(), evidence_text(correction));
   if (correction.unjudged > 0) {
     fmt::print("           {} loops of frames without odometry are not judged\n",
                correction.unjudged);
@@ -117,6 +109,17 @@ void print_times(const RunRecord& record, const std::vector<Detection>& detectio
 }
 
 }  // namespace
+
+std::string evidence_text(const Correction& correction) {
+  std::string text;
+  for (std::size_t i = 0; i < kAllLoopVerdicts.size(); ++i) {
+    const LoopVerdict verdict = kAllLoopVerdicts[i];
+    if (verdict == LoopVerdict::kept || correction.by_verdict[i] == 0) continue;
+    text += fmt::format("{}{} {}", text.empty() ? " (" : ", ", correction.by_verdict[i],
+                        to_string(verdict));
+  }
+  return text.empty() ? text : text + ')';
+}
 
 std::string share_text(double share, std::int64_t whole, int decimals) {
   return whole == 0 ? "-" : fmt::format("{:.{}f}", share, decimals);

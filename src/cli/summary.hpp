@@ -9,6 +9,9 @@
 
 namespace loopbit::cli {
 
+/// The rejected loops by their evidence, " (2 unreachable, 1 outlier)"; empty if there are none.
+std::string evidence_text(const Correction& correction);
+
 /// Prints what a finished run comes to, for people, on stdout. `report`: its file; may be empty.
 void print_summary(const RunOutcome& run, const std::string& report);
 

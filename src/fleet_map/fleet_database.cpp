@@ -14,7 +14,7 @@ namespace loopbit {
 namespace {
 
 /// The version of a map file with the same tables.
-constexpr int kFileVersion = 3;
+constexpr int kFileVersion = 4;
 
 /// Places of 0.6 KB each.
 constexpr std::int64_t kRowsAtOnce = 1024;

@@ -72,6 +72,22 @@ CREATE TABLE rejected (
   rejected bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
   FOREIGN KEY (session) REFERENCES session);
 ALTER TABLE rejected DROP COLUMN loop;
+CREATE TABLE odometry (
+  odometry bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
+  session bigint NOT NULL REFERENCES session,
+  frame bigint NOT NULL,
+  timestamp double precision CHECK (abs(timestamp) < 'Infinity'),
+  pose bytea NOT NULL CHECK (octet_length(pose) = 264),
+  checksum bigint NOT NULL);
+CREATE TABLE relative_pose (
+  relative_pose bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
+  session bigint NOT NULL REFERENCES session,
+  frame bigint NOT NULL,
+  match_session bigint NOT NULL,
+  match_frame bigint NOT NULL,
+  known text NOT NULL,
+  pose bytea NOT NULL CHECK (octet_length(pose) = 264),
+  checksum bigint NOT NULL);
 CREATE TABLE linked (session bigint PRIMARY KEY REFERENCES session, checksum bigint NOT NULL);
 -- Neither can be compressed any more.
 ALTER TABLE features ALTER COLUMN features SET STORAGE EXTERNAL;
@@ -109,7 +125,7 @@ GRANT INSERT (session, uid, name, started, loopbit, options, frames, checksum),
   UPDATE (frames, checksum) ON session TO loopbit_writer;
 GRANT INSERT (place, session, frame, timestamp, content, checksum), DELETE ON place TO loopbit_writer;
 GRANT INSERT, DELETE ON features, image, loop TO loopbit_writer;
-GRANT INSERT ON rejected TO loopbit_writer;
+GRANT INSERT ON rejected, odometry, relative_pose TO loopbit_writer;
 GRANT INSERT, UPDATE (checksum) ON linked TO loopbit_writer;
 ALTER TABLE session ENABLE ROW LEVEL SECURITY;
 CREATE POLICY readable ON session FOR SELECT TO loopbit_reader USING (true);
@@ -120,7 +136,8 @@ DECLARE
   part record;
 BEGIN
   FOR part IN VALUES ('place', 'session'), ('features', 'place >> 32'), ('image', 'place >> 32'),
-    ('loop', 'session'), ('rejected', 'session'), ('linked', 'session') LOOP
+    ('loop', 'session'), ('rejected', 'session'), ('linked', 'session'), ('odometry', 'session'),
+    ('relative_pose', 'session') LOOP
     EXECUTE format('ALTER TABLE %I ENABLE ROW LEVEL SECURITY', part.column1);
     EXECUTE format('CREATE POLICY readable ON %I FOR SELECT TO loopbit_reader USING (true)',
                    part.column1);

@@ -6,7 +6,7 @@
 
 namespace loopbit {
 
-/// The version of the tables on a server. All are those of map files of version 3.
+/// The version of the tables on a server. All are those of map files of version 4.
 inline constexpr int kFleetVersion = 1;
 
 /// Makes the tables and roles in the current transaction.

@@ -210,7 +210,7 @@ void GraphImpl::reject_improbable() {
   }
 }
 
-std::vector<int> GraphImpl::roots() const {
+std::vector<int> GraphImpl::worlds() const {
   Joined joined(keyframes_.size());
   for (const Keyframe& keyframe : keyframes_) {
     if (keyframe.odometry) joined.join(keyframe.odometry->from, keyframe.odometry->to);
@@ -218,10 +218,15 @@ std::vector<int> GraphImpl::roots() const {
   for (const std::size_t i : of_verdict(LoopVerdict::kept)) {
     joined.join(edges_[i].from, edges_[i].to);
   }
-  std::vector<int> found;
-  for (int i = 0; i < static_cast<int>(keyframes_.size()); ++i) {
-    if (joined.root(i) == i) found.push_back(i);
-  }
+  std::vector<int> found(keyframes_.size());
+  for (std::size_t i = 0; i < found.size(); ++i) found[i] = joined.root(static_cast<int>(i));
+  return found;
+}
+
+std::vector<int> GraphImpl::roots() const {
+  std::vector<int> found = worlds();
+  std::ranges::sort(found);
+  found.erase(std::ranges::unique(found).begin(), found.end());
   return found;
 }
 

@@ -35,6 +35,7 @@ class GraphImpl {
   [[nodiscard]] const std::vector<JudgedLoop>& loops() const { return loops_; }
   [[nodiscard]] const std::vector<graph::Edge>& edges() const { return edges_; }
   [[nodiscard]] double cost() const;
+  [[nodiscard]] std::vector<int> worlds() const;
 
   // For files, which have what was solved.
   void set_pose(int keyframe, const graph::Pose& pose);

@@ -226,6 +226,8 @@ cv::Matx44d LoopGraph::pose(int keyframe) const {
   return graph::matrix_of(impl_->poses().at(static_cast<std::size_t>(keyframe)));
 }
 
+std::vector<int> LoopGraph::worlds() const { return impl_->worlds(); }
+
 std::optional<Motion> LoopGraph::odometry(int keyframe) const {
   const auto& edge = impl_->keyframes().at(static_cast<std::size_t>(keyframe)).odometry;
   if (!edge) return std::nullopt;

@@ -12,6 +12,12 @@
 namespace loopbit {
 namespace {
 
+/// None unless it is finite.
+std::optional<double> time_of(const Detection& detection) {
+  const bool has_time = detection.timestamp_s && std::isfinite(*detection.timestamp_s);
+  return has_time ? detection.timestamp_s : std::nullopt;
+}
+
 constexpr std::size_t kFramesPerBatch = 32;
 constexpr std::chrono::seconds kMaxDelay{1};
 /// 12 MB of features, and 50 MB of images if these are saved.
@@ -20,10 +26,12 @@ constexpr std::size_t kMaxPendingFrames = 256;
 }  // namespace
 
 BatchWriter::BatchWriter(std::unique_ptr<MapDatabase> database, MapSession session,
-                         std::int64_t first_place, EncodeImage encode_image)
+                         std::int64_t first_place, const OdometryDrift& drift,
+                         EncodeImage encode_image)
     : database_(std::move(database)),
       session_(std::move(session)),
       first_place_(first_place),
+      drift_(drift),
       encode_image_(std::move(encode_image)),
       thread_([this] { commit_batches(); }) {}
 
@@ -40,8 +48,16 @@ void BatchWriter::add(AddedFrame frame) {
   std::unique_lock lock(mutex_);
   committed_.wait(lock, [&] { return error_ || pending_.size() < kMaxPendingFrames; });
   if (error_) std::rethrow_exception(error_);
+  if (frame.detection.odometry) complete(*frame.detection.odometry);
   pending_.push_back(std::move(frame));
   if (pending_.size() == 1 || pending_.size() >= kFramesPerBatch) added_.notify_all();
+}
+
+/// Here, because a batch may be written twice.
+void BatchWriter::complete(OdometryPose& pose) {
+  const cv::Matx44d& now = pose.T_odometry_camera;
+  pose.covariance = odometry_step(last_pose_.value_or(now), pose, drift_).covariance;
+  last_pose_ = now;
 }
 
 void BatchWriter::change(std::function<void(const MapDatabase&)> change) {
@@ -161,11 +177,15 @@ void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& ch
 
 void BatchWriter::write(const AddedFrame& frame) {
   const Detection& detection = frame.detection;
+  if (detection.odometry) {
+    rows_->write({.at = {session_.session, detection.frame},
+                  .timestamp_s = time_of(detection),
+                  .pose = *detection.odometry});
+  }
   if (detection.status == Status::unreadable) return;
-  const bool has_time = detection.timestamp_s && std::isfinite(*detection.timestamp_s);
   const MapPlace place{.id = first_place_ + detection.frame,
                        .at = {session_.session, detection.frame},
-                       .timestamp_s = has_time ? detection.timestamp_s : std::nullopt,
+                       .timestamp_s = time_of(detection),
                        .content = frame.content};
   rows_->write(place, *frame.features);
   if (!frame.image.empty()) rows_->write_image(place, encode_image_(frame.image));

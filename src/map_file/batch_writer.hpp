@@ -32,9 +32,9 @@ struct AddedFrame {
 /// is first_place + k. One thread at a time may call it.
 class BatchWriter {
  public:
-  /// `encode_image` may be empty.
+  /// `drift`: of odometry without covariances. `encode_image` may be empty.
   BatchWriter(std::unique_ptr<MapDatabase> database, MapSession session, std::int64_t first_place,
-              EncodeImage encode_image);
+              const OdometryDrift& drift, EncodeImage encode_image);
   /// Drops uncommitted frames.
   ~BatchWriter();
   BatchWriter(const BatchWriter&) = delete;
@@ -71,11 +71,15 @@ class BatchWriter {
   [[nodiscard]] bool is_committed(std::int64_t frames) const;
   void commit(const std::vector<AddedFrame>& batch, const Changes& changes);
   void write(const AddedFrame& frame);
+  /// Gives it the covariance since the pose before, if it has none.
+  void complete(OdometryPose& pose);
 
   std::unique_ptr<MapDatabase> database_;
   std::optional<RowWriter> rows_;  ///< from the first commit on: an older map lacks tables
   MapSession session_;             ///< session_.frames are committed; for the thread only
   std::int64_t first_place_;
+  OdometryDrift drift_;
+  std::optional<cv::Matx44d> last_pose_;  ///< by odometry, of the last frame that was added
   EncodeImage encode_image_;
 
   mutable std::mutex mutex_;  ///< guards all below

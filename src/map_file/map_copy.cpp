@@ -76,6 +76,14 @@ class MapCopy {
     if (renumber(loop.query) && renumber(loop.match)) rows_.write_rejected(loop);
   }
 
+  void copy_odometry(MapOdometry odometry) {
+    if (renumber(odometry.at)) rows_.write(odometry);
+  }
+
+  void copy_pose(MapLoopPose pose) {
+    if (renumber(pose.query) && renumber(pose.match)) rows_.write(pose);
+  }
+
  private:
   [[nodiscard]] bool renumber(SessionFrame& at) const {
     const auto found = numbers_.find(at.session);
@@ -121,6 +129,8 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const MapDatabase& to
   });
   for (const MapLoop& loop : from.loops()) counts.loops += copy.copy_loop(loop);
   for (const MapLoop& loop : from.rejected_loops()) copy.copy_rejected(loop);
+  for (const MapOdometry& odometry : from.odometry()) copy.copy_odometry(odometry);
+  for (const MapLoopPose& pose : from.loop_poses()) copy.copy_pose(pose);
   transaction->end();
   return counts;
 }
@@ -201,6 +211,12 @@ MergeCounts merge(const MapDatabase& to, MapReader& source) {
   }
   for (const MapLoop& loop : source.rejected_loops()) {
     if (added.contains(loop.query.session)) copy.copy_rejected(loop);
+  }
+  for (const MapOdometry& odometry : source.odometry()) {
+    if (added.contains(odometry.at.session)) copy.copy_odometry(odometry);
+  }
+  for (const MapLoopPose& pose : source.loop_poses()) {
+    if (added.contains(pose.query.session)) copy.copy_pose(pose);
   }
   refuse_damaged(source.path(), source.damage());
   transaction->end();
@@ -294,7 +310,7 @@ bool has_whole_image(const std::string& path) {
   return found;
 }
 
-/// Whether `linked` and `rejected` begin where a map of the newest version has them.
+/// Whether `linked` and `rejected` begin where a map of the version that has them has them.
 bool has_whole_links(const std::string& path) {
   const FileDatabase database(open_map_for_reading(path));
   Damage damage;
@@ -304,6 +320,15 @@ bool has_whole_links(const std::string& path) {
   return before == 0 &&
          std::none_of(damage.clauses().begin(), damage.clauses().end(),
                       [](const std::string& clause) { return clause.starts_with("linked"); });
+}
+
+/// The same for `odometry` and `relative_pose`.
+bool has_whole_odometry(const std::string& path) {
+  const FileDatabase database(open_map_for_reading(path));
+  Damage damage;
+  (void)read_odometry(database, damage);
+  (void)read_loop_poses(database, damage);
+  return damage.clauses().empty();
 }
 
 bool can_be_opened(const std::string& path) {
@@ -328,6 +353,18 @@ void rename_to_new(const std::string& from, const std::string& to) {
   throw errno == EEXIST ? already_there(to) : cannot_write(to, errno);
 }
 
+/// Of the version that the map began with: where an older one has other rows, later tables would
+/// begin.
+void make_first_page(const RepairedCopy& copy, const std::string& from) {
+  copy.make(from, kMapVersion);
+  if (has_whole_odometry(copy.path())) return;
+  copy.make(from, kFirstVersionWithOdometry - 1);
+  if (has_whole_links(copy.path())) return;
+  copy.make(from, kFirstVersionWithLinks - 1);
+  if (has_whole_image(copy.path())) return;
+  copy.make(from, kFirstVersionWithImages - 1);
+}
+
 MapCheck recover_to_new(const std::string& from, const std::string& to) {
   std::error_code error;
   const bool has_page = fs::file_size(from, error) >= kMapPageBytes && !error;
@@ -336,12 +373,7 @@ MapCheck recover_to_new(const std::string& from, const std::string& to) {
     return copy_to_new(source, to);
   }
   const RepairedCopy copy(to + ".repaired");
-  copy.make(from, kMapVersion);
-  // Perhaps the map began with an older version, where other rows are at the pages of later tables.
-  if (!has_whole_links(copy.path())) {
-    copy.make(from, kFirstVersionWithLinks - 1);
-    if (!has_whole_image(copy.path())) copy.make(from, kFirstVersionWithImages - 1);
-  }
+  make_first_page(copy, from);
   MapReader source(copy.path());
   MapCheck check = copy_to_new(source, to);
   check.damage.insert(check.damage.begin(), "the file: its first page cannot be read");

@@ -20,6 +20,7 @@ struct Edge {
   std::int64_t query = 0;
   std::int64_t match = 0;
   MapLoop loop;
+  KnownMotion motion;  ///< from match to query
 };
 
 /// Loops of dropped sessions are left out.
@@ -30,11 +31,15 @@ std::vector<Edge> edges_of(MapReader& map) {
     first_frame[session.session] = std::exchange(frames, frames + session.frames);
   }
   std::vector<Edge> edges;
-  for (const MapLoop& loop : map.loops()) {
+  const std::vector<MapLoop> loops = map.loops();
+  const std::vector<KnownMotion> motions = map.motions_of(loops);
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    const MapLoop& loop = loops[i];
     const auto query = first_frame.find(loop.query.session);
     const auto match = first_frame.find(loop.match.session);
     if (query == first_frame.end() || match == first_frame.end()) continue;
-    edges.push_back({query->second + loop.query.frame, match->second + loop.match.frame, loop});
+    edges.push_back(
+        {query->second + loop.query.frame, match->second + loop.match.frame, loop, motions[i]});
   }
   return edges;
 }
@@ -43,7 +48,7 @@ std::string csv(const std::vector<Edge>& edges) {
   std::string text =
       "query,match,score,query_session,query_frame,match_session,match_frame,similarity,matches,"
       "inliers\n";
-  for (const auto& [query, match, loop] : edges) {
+  for (const auto& [query, match, loop, motion] : edges) {
     text += fmt::format("{},{},{},{},{},{},{},{:.6f},{},{}\n", query, match, loop.score,
                         loop.query.session, loop.query.frame, loop.match.session, loop.match.frame,
                         loop.similarity, loop.matches, loop.inliers);
@@ -62,7 +67,7 @@ std::string json(const MapReader& map, const std::vector<Edge>& edges) {
                                 {"started", session.started},
                                 {"frames", session.frames}});
   }
-  for (const auto& [query, match, loop] : edges) {
+  for (const auto& [query, match, loop, motion] : edges) {
     json["loops"].push_back({{"query", to_json(loop.query)},
                              {"match", to_json(loop.match)},
                              {"score", loop.score},
@@ -74,6 +79,7 @@ std::string json(const MapReader& map, const std::vector<Edge>& edges) {
 }
 
 /// g2o's text format (github.com/RainerKuemmerle/g2o, "File format"): one vertex or edge per line.
+/// Edges that were not measured are identities.
 std::string g2o(const std::vector<Edge>& edges) {
   constexpr const char* kIdentityPose = "0 0 0 0 0 0 1";
   constexpr const char* kIdentityInformation = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1";
@@ -84,8 +90,11 @@ std::string g2o(const std::vector<Edge>& edges) {
     text += fmt::format("VERTEX_SE3:QUAT {} {}\n", frame, kIdentityPose);
   }
   for (const Edge& edge : edges) {
-    text += fmt::format("EDGE_SE3:QUAT {} {} {} {}\n", edge.match, edge.query, kIdentityPose,
-                        kIdentityInformation);
+    text += edge.motion.known == PoseKnown::nothing
+                ? fmt::format("EDGE_SE3:QUAT {} {} {} {}", edge.match, edge.query, kIdentityPose,
+                              kIdentityInformation)
+                : to_g2o_edge(edge.motion, edge.match, edge.query);
+    text += '\n';
   }
   return text;
 }

@@ -4,10 +4,12 @@
 
 #include <chrono>
 #include <ctime>
+#include <map>
 #include <new>
 #include <random>
 #include <set>
 #include <thread>
+#include <tuple>
 #include <utility>
 
 #include <fmt/chrono.h>
@@ -93,6 +95,26 @@ std::vector<MapLoop> MapReader::loops() { return read_loops(*impl_->database, im
 
 std::vector<MapLoop> MapReader::rejected_loops() {
   return read_rejected_loops(*impl_->database, impl_->damage);
+}
+
+std::vector<MapOdometry> MapReader::odometry() {
+  return read_odometry(*impl_->database, impl_->damage);
+}
+
+std::vector<MapLoopPose> MapReader::loop_poses() {
+  return read_loop_poses(*impl_->database, impl_->damage);
+}
+
+std::vector<KnownMotion> MapReader::motions_of(const std::vector<MapLoop>& loops) {
+  const auto key_of = [](const auto& loop) {
+    return std::tuple(loop.query.session, loop.query.frame, loop.match.session, loop.match.frame);
+  };
+  std::map<std::tuple<int, int, int, int>, KnownMotion> measured;
+  for (const MapLoopPose& pose : loop_poses()) measured[key_of(pose)] = pose.measured;
+  std::vector<KnownMotion> motions;
+  motions.reserve(loops.size());
+  for (const MapLoop& loop : loops) motions.push_back(measured[key_of(loop)]);
+  return motions;
 }
 
 std::optional<Features> MapReader::features_of(const MapPlace& place) {
@@ -245,6 +267,15 @@ class MapWriter::Impl {
     writer_->change([id](const MapDatabase& database) { remove_place(database, id); });
   }
 
+  void add_pose(MapLoopPose pose) {
+    (void)stored();  // not after finish()
+    if (pose.measured.known == PoseKnown::nothing) return;
+    for (SessionFrame* at : {&pose.query, &pose.match}) {
+      if (at->session == 0) at->session = session_;
+    }
+    writer_->change([pose](const MapDatabase& database) { RowWriter(database).write(pose); });
+  }
+
   void reject(SessionFrame query, SessionFrame match) {
     (void)stored();  // not after finish()
     for (SessionFrame* at : {&query, &match}) {
@@ -283,7 +314,7 @@ class MapWriter::Impl {
                        .options = to_json(options_),
                        .linked = begun.is_linked};
     return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_,
-                                         std::move(encode_image));
+                                         options_.odometry, std::move(encode_image));
   }
 
   /// Throws Error (kind option) if they were made with other settings.
@@ -346,6 +377,7 @@ void MapWriter::check_process() const { impl_->check_process(); }
 int MapWriter::session() const { return impl().session(); }
 std::int64_t MapWriter::saved_frames() const { return impl().writer().saved_frames(); }
 int MapWriter::reconnections() const { return impl().writer().reconnections(); }
+void MapWriter::add_pose(const MapLoopPose& pose) { impl().add_pose(pose); }
 void MapWriter::flush() { impl().writer().flush(); }
 void MapWriter::finish() { impl().finish(); }
 const std::vector<std::string>& MapWriter::damage() const { return impl().damage().clauses(); }

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
 #include <tuple>
@@ -40,6 +42,16 @@ std::vector<MapPlace> places_of(const MapDatabase& database, int session, Damage
   const auto frame = [](const MapPlace& place) { return place.at.frame; };
   std::ranges::stable_sort(places, {}, frame);
   return places;
+}
+
+using OdometryByFrame = std::map<std::int64_t, OdometryPose>;
+
+OdometryByFrame odometry_of(const MapDatabase& database, int session, Damage& damage) {
+  OdometryByFrame poses;
+  for (const MapOdometry& odometry : read_odometry(database, damage)) {
+    if (odometry.at.session == session) poses[odometry.at.frame] = odometry.pose;
+  }
+  return poses;
 }
 
 /// A map as it was for the detector of one of its sessions, whose frames are processed again.
@@ -125,6 +137,7 @@ class Relived {
       : path_(path),
         session_(session),
         map_(std::make_shared<MapBefore>(path, database, session)),
+        odometry_(odometry_of(database, session, map_->damage())),
         reader_(database),
         known_(read_loops(database, map_->damage()), session),
         rejected_(read_rejected_loops(database, map_->damage()), session),
@@ -137,8 +150,8 @@ class Relived {
     auto features = reader_.read(place.id, place.at, map_->damage());
     refuse_damaged(path_, map_->damage().clauses());
     map_->announce(&place);
-    const Detection detection =
-        detector_.process(place.content, std::move(*features), place.timestamp_s);
+    const Detection detection = detector_.process(place.content, std::move(*features),
+                                                  place.timestamp_s, odometry_at(place.at.frame));
     refuse_damaged(path_, map_->damage().clauses());
     frames_.push_back(place.at.frame);
     if (detection.status == Status::loop) {
@@ -156,6 +169,11 @@ class Relived {
   }
 
  private:
+  [[nodiscard]] std::optional<OdometryPose> odometry_at(std::int64_t frame) const {
+    const auto found = odometry_.find(frame);
+    return found == odometry_.end() ? std::nullopt : std::optional(found->second);
+  }
+
   /// `counted`: with frames as the detector counts them.
   void add(const MapLoop& counted, std::vector<MapLoop>& found) {
     const MapLoop loop = in_session(counted);
@@ -178,7 +196,7 @@ class Relived {
   void skip_to(std::int64_t frame) {
     map_->announce(nullptr);
     for (auto i = std::max(next_frame_, frame - kMaxSkipped); i < frame; ++i) {
-      detector_.skip();
+      detector_.skip(std::nullopt, odometry_at(i));
       frames_.push_back(-1);
     }
     next_frame_ = frame + 1;
@@ -187,6 +205,7 @@ class Relived {
   std::string path_;
   int session_;
   std::shared_ptr<MapBefore> map_;
+  OdometryByFrame odometry_;
   FeatureReader reader_;
   FramePairs known_;
   FramePairs rejected_;
@@ -277,20 +296,49 @@ LinkCounts link(const std::string& path, const MapDatabase& database,
   return counts;
 }
 
-}  // namespace
+/// Throws Error (kind input) if sessions, loops or what belongs to them are damaged.
+void refuse_damaged_loops(const std::string& path, const MapDatabase& database) {
+  Damage damage;
+  (void)read_sessions(database, damage);
+  (void)read_loops(database, damage);
+  (void)read_rejected_loops(database, damage);
+  (void)read_odometry(database, damage);
+  (void)read_loop_poses(database, damage);
+  refuse_damaged(path, damage.clauses());
+}
 
-LinkCounts link_map(const std::string& path, const std::optional<LoopDetectorOptions>& options,
-                    const std::function<bool(const LinkCounts&)>& progress) {
+/// Calls `write(database)` with the existing map at `path`, and closes it.
+template <typename Write>
+void write_map(const std::string& path, const Write& write) {
   (void)open_map(path, MapDatabase::Access::read);  // it must exist
   const auto database = open_map(path, MapDatabase::Access::link);
   try {
-    const LinkCounts counts = link(path, *database, options, progress);
-    database->close();
-    return counts;
+    write(*database);
   } catch (...) {
     database->close();
     throw;
   }
+  database->close();
+}
+
+}  // namespace
+
+LinkCounts link_map(const std::string& path, const std::optional<LoopDetectorOptions>& options,
+                    const std::function<bool(const LinkCounts&)>& progress) {
+  LinkCounts counts;
+  write_map(path,
+            [&](const MapDatabase& database) { counts = link(path, database, options, progress); });
+  return counts;
+}
+
+void reject_loops(const std::string& path, const std::vector<MapLoop>& loops) {
+  if (loops.empty()) return;
+  write_map(path, [&](const MapDatabase& database) {
+    refuse_damaged_loops(path, database);
+    const auto transaction = database.begin();
+    for (const MapLoop& loop : loops) reject_loop(database, loop.query, loop.match);
+    transaction->end();
+  });
 }
 
 }  // namespace loopbit

@@ -143,6 +143,38 @@ std::optional<Features> features_from(std::span<const unsigned char> bytes) {
   return features;
 }
 
+/// The first three rows of a pose, then the upper triangle of its covariance, row by row.
+using PoseNumbers = std::array<double, 12 + 21>;
+
+PoseNumbers pose_numbers(const cv::Matx44d& pose, const cv::Matx66d& covariance) {
+  PoseNumbers numbers{};
+  double* end = std::copy_n(pose.val, 12, numbers.begin());
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column) *end++ = covariance(row, column);
+  }
+  return numbers;
+}
+
+std::span<const unsigned char> bytes_of(const PoseNumbers& numbers) {
+  return {reinterpret_cast<const unsigned char*>(numbers.data()), sizeof numbers};
+}
+
+/// None unless the bytes are those of pose_numbers().
+std::optional<Motion> motion_from(std::span<const unsigned char> bytes) {
+  PoseNumbers numbers{};
+  if (bytes.size() != sizeof numbers) return std::nullopt;
+  copy_in(bytes, numbers.data(), numbers.size());
+  Motion motion;
+  std::copy_n(numbers.begin(), 12, motion.T_from_to.val);
+  const double* next = &numbers[12];
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column) {
+      motion.covariance(row, column) = motion.covariance(column, row) = *next++;
+    }
+  }
+  return motion;
+}
+
 /// After an unreadable page, this many keys are tried to find the next readable one: ten in
 /// sequence, then in steps that grow to 100, over 51,000 keys in all. A leaf page of contents has
 /// 29 rows, and a page above it leads to about 50,000.
@@ -241,6 +273,25 @@ Checksum checksum_of_rejected(const MapLoop& loop) {
       .add(loop.similarity)
       .add(std::int64_t{loop.matches})
       .add(std::int64_t{loop.inliers});
+}
+
+/// As of images, the order tells it from a place.
+Checksum checksum_of(const MapOdometry& odometry, std::span<const unsigned char> pose) {
+  return Checksum()
+      .add(pose)
+      .add(std::int64_t{odometry.at.session})
+      .add(std::int64_t{odometry.at.frame})
+      .add(odometry.timestamp_s.value_or(0.0));
+}
+
+Checksum checksum_of(const MapLoopPose& pose, std::span<const unsigned char> bytes) {
+  return Checksum()
+      .add(bytes)
+      .add(std::int64_t{pose.query.session})
+      .add(std::int64_t{pose.query.frame})
+      .add(std::int64_t{pose.match.session})
+      .add(std::int64_t{pose.match.frame})
+      .add(to_string(pose.measured.known));
 }
 
 Checksum checksum_of_linked(int session) { return Checksum().add(std::int64_t{session}); }
@@ -381,6 +432,52 @@ std::vector<MapLoop> read_rejected_loops(const MapDatabase& database, Damage& da
   return read_loops_of(database, "rejected", checksum_of_rejected, damage);
 }
 
+std::vector<MapOdometry> read_odometry(const MapDatabase& database, Damage& damage) {
+  std::vector<MapOdometry> all;
+  if (!has_odometry(database)) return all;
+  for_each_row(
+      database, "odometry", "odometry, session, frame, timestamp, pose, checksum", damage,
+      [&](const SqlStatement& row, std::int64_t key) {
+        MapOdometry odometry{.at = session_frame(row, 1)};
+        if (!row.is_null(3)) odometry.timestamp_s = row.real(3);
+        if (const auto motion = motion_from(row.bytes(4))) {
+          odometry.pose = {motion->T_from_to, motion->covariance};
+        }
+        if (odometry.pose.covariance && is_valid(odometry.pose) &&
+            has_checksum(row, 5, checksum_of(odometry, row.bytes(4)))) {
+          all.push_back(odometry);
+        } else {
+          damage.add(fmt::format("odometry {}: its values differ from their checksum", key));
+        }
+      });
+  const auto place = [](const MapOdometry& one) { return std::pair(one.at.session, one.at.frame); };
+  std::ranges::stable_sort(all, {}, place);
+  return all;
+}
+
+std::vector<MapLoopPose> read_loop_poses(const MapDatabase& database, Damage& damage) {
+  std::vector<MapLoopPose> poses;
+  if (!has_odometry(database)) return poses;
+  for_each_row(
+      database, "relative_pose",
+      "relative_pose, session, frame, match_session, match_frame, known, pose, checksum", damage,
+      [&](const SqlStatement& row, std::int64_t key) {
+        MapLoopPose pose{.query = session_frame(row, 1), .match = session_frame(row, 3)};
+        const auto motion = motion_from(row.bytes(6));
+        const auto* const known = std::ranges::find(kAllPoseKnown, row.text(5),
+                                                    [](PoseKnown each) { return to_string(each); });
+        const bool is_pose = motion && known != kAllPoseKnown.end() &&
+                             is_valid({motion->T_from_to}) && cv::checkRange(motion->covariance);
+        if (is_pose) pose.measured = {*known, *motion};
+        if (is_pose && has_checksum(row, 7, checksum_of(pose, row.bytes(6)))) {
+          poses.push_back(pose);
+        } else {
+          damage.add(fmt::format("relative_pose {}: its values differ from their checksum", key));
+        }
+      });
+  return poses;
+}
+
 MapLoop loop_of(const Detection& detection, int session) {
   return {
       .query = {session, detection.frame},
@@ -467,7 +564,12 @@ RowWriter::RowWriter(const MapDatabase& database)
           database.prepare("INSERT INTO features (place, features, checksum) VALUES (?1, ?2, ?3)")),
       image_(database.prepare("INSERT INTO image (place, image, checksum) VALUES (?1, ?2, ?3)")),
       loop_(database.prepare(insertion_of_loop("loop"))),
-      rejected_(database.prepare(insertion_of_loop("rejected"))) {}
+      rejected_(database.prepare(insertion_of_loop("rejected"))),
+      odometry_(database.prepare("INSERT INTO odometry (session, frame, timestamp, pose, checksum) "
+                                 "VALUES (?1, ?2, ?3, ?4, ?5)")),
+      relative_pose_(database.prepare(
+          "INSERT INTO relative_pose (session, frame, match_session, match_frame, known, pose, "
+          "checksum) VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7)")) {}
 
 void RowWriter::write(const MapSession& session) {
   session_->bind(1, std::int64_t{session.session});
@@ -512,6 +614,32 @@ void RowWriter::write(const MapLoop& loop) { write_loop(*loop_, loop, checksum_o
 
 void RowWriter::write_rejected(const MapLoop& loop) {
   write_loop(*rejected_, loop, checksum_of_rejected(loop));
+}
+
+void RowWriter::write(const MapOdometry& odometry) {
+  const PoseNumbers numbers =
+      pose_numbers(odometry.pose.T_odometry_camera, odometry.pose.covariance.value());
+  odometry_->bind(1, std::int64_t{odometry.at.session});
+  odometry_->bind(2, std::int64_t{odometry.at.frame});
+  odometry.timestamp_s ? odometry_->bind(3, *odometry.timestamp_s) : odometry_->bind_null(3);
+  odometry_->bind(4, bytes_of(numbers));
+  odometry_->bind(5, checksum_of(odometry, bytes_of(numbers)).value());
+  odometry_->step();
+  odometry_->reset();
+}
+
+void RowWriter::write(const MapLoopPose& pose) {
+  const Motion& motion = pose.measured.motion;
+  const PoseNumbers numbers = pose_numbers(motion.T_from_to, motion.covariance);
+  relative_pose_->bind(1, std::int64_t{pose.query.session});
+  relative_pose_->bind(2, std::int64_t{pose.query.frame});
+  relative_pose_->bind(3, std::int64_t{pose.match.session});
+  relative_pose_->bind(4, std::int64_t{pose.match.frame});
+  relative_pose_->bind(5, to_string(pose.measured.known));
+  relative_pose_->bind(6, bytes_of(numbers));
+  relative_pose_->bind(7, checksum_of(pose, bytes_of(numbers)).value());
+  relative_pose_->step();
+  relative_pose_->reset();
 }
 
 void RowWriter::write_linked(int session) {

@@ -50,6 +50,12 @@ void for_each_image(const MapDatabase& database,
 std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage);
 std::vector<MapLoop> read_rejected_loops(const MapDatabase& database, Damage& damage);
 
+/// In order of session and frame.
+std::vector<MapOdometry> read_odometry(const MapDatabase& database, Damage& damage);
+
+/// In the order in which they were measured.
+std::vector<MapLoopPose> read_loop_poses(const MapDatabase& database, Damage& damage);
+
 /// The loop of `session` that a detection, one of a loop, is.
 MapLoop loop_of(const Detection& detection, int session);
 MapLoop loop_of(const LateLoop& loop, int session);
@@ -93,6 +99,9 @@ class RowWriter {
   void write_image(const MapPlace& place, std::span<const unsigned char> jpeg);
   void write(const MapLoop& loop);
   void write_rejected(const MapLoop& loop);
+  /// Its pose has a covariance.
+  void write(const MapOdometry& odometry);
+  void write(const MapLoopPose& pose);
 
  private:
   std::unique_ptr<SqlStatement> session_;
@@ -102,6 +111,8 @@ class RowWriter {
   std::unique_ptr<SqlStatement> image_;
   std::unique_ptr<SqlStatement> loop_;
   std::unique_ptr<SqlStatement> rejected_;
+  std::unique_ptr<SqlStatement> odometry_;
+  std::unique_ptr<SqlStatement> relative_pose_;
 };
 
 // Changes of rows in the current transaction. They throw Error (kind output).

@@ -55,7 +55,16 @@ constexpr std::array kTables{
           "INTEGER NOT NULL, match_session INTEGER NOT NULL, match_frame INTEGER NOT NULL, score "
           "REAL NOT NULL, similarity REAL NOT NULL, matches INTEGER NOT NULL, inliers INTEGER NOT "
           "NULL, checksum INTEGER NOT NULL)",
-          kFirstVersionWithLinks}};
+          kFirstVersionWithLinks},
+    Table{"odometry",
+          "CREATE TABLE odometry (odometry INTEGER PRIMARY KEY, session INTEGER NOT NULL, frame "
+          "INTEGER NOT NULL, timestamp REAL, pose BLOB NOT NULL, checksum INTEGER NOT NULL)",
+          kFirstVersionWithOdometry},
+    Table{"relative_pose",
+          "CREATE TABLE relative_pose (relative_pose INTEGER PRIMARY KEY, session INTEGER NOT "
+          "NULL, frame INTEGER NOT NULL, match_session INTEGER NOT NULL, match_frame INTEGER NOT "
+          "NULL, known TEXT NOT NULL, pose BLOB NOT NULL, checksum INTEGER NOT NULL)",
+          kFirstVersionWithOdometry}};
 
 /// SQLite creates it for AUTOINCREMENT.
 constexpr Table kSequences{"sqlite_sequence", "CREATE TABLE sqlite_sequence(name,seq)"};
@@ -173,6 +182,10 @@ bool has_images(const MapDatabase& database) {
 }
 
 bool has_links(const MapDatabase& database) { return database.version() >= kFirstVersionWithLinks; }
+
+bool has_odometry(const MapDatabase& database) {
+  return database.version() >= kFirstVersionWithOdometry;
+}
 
 Database open_map_for_writing(const std::string& path, int version) {
   Database database = lock_map(path);

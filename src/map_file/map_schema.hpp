@@ -13,9 +13,10 @@ namespace loopbit {
 inline constexpr int kMapApplicationId = 0x6c6f6f70;
 
 /// The version of the format that this library writes. It also reads all earlier ones.
-inline constexpr int kMapVersion = 3;
+inline constexpr int kMapVersion = 4;
 inline constexpr int kFirstVersionWithImages = 2;
 inline constexpr int kFirstVersionWithLinks = 3;
+inline constexpr int kFirstVersionWithOdometry = 4;
 
 /// Pages are large because features take 48 KB per place and contents are read in sequence.
 inline constexpr int kMapPageBytes = 16384;
@@ -59,6 +60,9 @@ bool has_images(const MapDatabase& database);
 
 /// Whether the map's version has the tables `linked` and `rejected`.
 bool has_links(const MapDatabase& database);
+
+/// Whether the map's version has the tables `odometry` and `relative_pose`.
+bool has_odometry(const MapDatabase& database);
 
 /// Opens a map for reading, also while it is written. Throws Error (kind input) as above.
 Database open_map_for_reading(const std::string& path);

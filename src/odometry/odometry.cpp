@@ -65,14 +65,25 @@ cv::Matx66d drift_covariance(const cv::Matx44d& T_from_to, const OdometryDrift& 
   return cv::Matx66d::diag({p, p, p, r, r, r});
 }
 
+Motion odometry_step(const cv::Matx44d& before, const OdometryPose& pose,
+                     const OdometryDrift& drift) {
+  const cv::Matx44d step = rigid::inverse(before) * pose.T_odometry_camera;
+  return {step, pose.covariance ? *pose.covariance : drift_covariance(step, drift)};
+}
+
+bool is_valid(const OdometryPose& pose) {
+  return is_finite(pose.T_odometry_camera.val, 16) && is_rigid(pose.T_odometry_camera) &&
+         (!pose.covariance || is_covariance(*pose.covariance));
+}
+
 void check_odometry(const OdometryPose& pose, const std::string& name) {
-  if (!is_finite(pose.T_odometry_camera.val, 16) || !is_rigid(pose.T_odometry_camera)) {
+  if (!is_valid({pose.T_odometry_camera})) {
     throw Error(ErrorKind::input,
                 fmt::format("{} is not a rigid motion: give a rotation (3 x 3), a finite position "
                             "in metres, and 0 0 0 1 as the last row.",
                             name));
   }
-  if (pose.covariance && !is_covariance(*pose.covariance)) {
+  if (!is_valid(pose)) {
     throw Error(ErrorKind::input, fmt::format("The covariance of {} is not positive definite: give "
                                               "a symmetric one of (x, y, z, rx, ry, rz), or none.",
                                               name));
@@ -91,12 +102,10 @@ OdometryTrack::Frame OdometryTrack::next(const std::optional<OdometryPose>& pose
   frame.is_known = true;
   frame.pose = pose->T_odometry_camera;
   if (!last_) return frame;
-  const cv::Matx44d step = rigid::inverse(last_->pose) * frame.pose;
+  const Motion step = odometry_step(last_->pose, *pose, drift_);
   const cv::Matx66d adjoint = rigid::adjoint(frame.pose);
-  const cv::Matx66d covariance =
-      pose->covariance ? *pose->covariance : drift_covariance(step, drift_);
-  frame.path_m += cv::norm(rigid::translation(step));
-  frame.drift = last_->drift + adjoint * covariance * adjoint.t();
+  frame.path_m += cv::norm(rigid::translation(step.T_from_to));
+  frame.drift = last_->drift + adjoint * step.covariance * adjoint.t();
   return frame;
 }
 

@@ -10,7 +10,6 @@
 
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
-#include <opencv2/core/quaternion.hpp>
 
 #include "loopbit/error.hpp"
 #include "loopbit/ray_geometry.hpp"
@@ -403,20 +402,6 @@ std::string_view to_string(PoseStatus status) {
   return "";
 }
 
-std::string_view to_string(PoseKnown known) {
-  switch (known) {
-    case PoseKnown::nothing:
-      return "nothing";
-    case PoseKnown::rotation:
-      return "rotation";
-    case PoseKnown::direction:
-      return "direction";
-    case PoseKnown::metric:
-      return "metric";
-  }
-  return "";
-}
-
 std::string_view to_string(ScaleStatus status) {
   switch (status) {
     case ScaleStatus::not_asked:
@@ -450,41 +435,18 @@ cv::Mat1f depth_in_metres(const cv::Mat& depth, double units_per_m) {
                                             depth.channels(), depth.depth()));
 }
 
-cv::Matx66d g2o_information(const RelativePose& pose) {
-  const int first = pose.known == PoseKnown::metric ? 0 : 3;
-  cv::Matx66d information = cv::Matx66d::zeros();
-  if (pose.known == PoseKnown::nothing) return information;
-  const cv::Mat covariance(pose.covariance);
-  cv::Mat1d inverse;
-  cv::invert(covariance(cv::Range(first, 6), cv::Range(first, 6)), inverse, cv::DECOMP_SVD);
-  constexpr double kHalfAngle = 2;  // a rotation vector is twice the quaternion's
-  for (int row = first; row < 6; ++row) {
-    for (int column = first; column < 6; ++column) {
-      const double unit = (row >= 3 ? kHalfAngle : 1) * (column >= 3 ? kHalfAngle : 1);
-      information(row, column) = unit * inverse(row - first, column - first);
-    }
-  }
-  return information;
+KnownMotion known_motion(const RelativePose& pose) {
+  return {pose.known, {pose.T_match_query, pose.covariance}};
 }
 
-std::string to_tum_pose(const RelativePose& pose) {
-  const cv::Matx33d rotation = pose.T_match_query.get_minor<3, 3>(0, 0);
-  const cv::Quatd q = cv::Quatd::createFromRotMat(rotation);
-  const double sign = q.w < 0 ? -1 : 1;
-  const cv::Matx44d& t = pose.T_match_query;
-  return fmt::format("{:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g} {:.9g}", t(0, 3), t(1, 3), t(2, 3),
-                     sign * q.x + 0.0, sign * q.y + 0.0, sign * q.z + 0.0,  // not -0
-                     sign * q.w);
+cv::Matx66d g2o_information(const RelativePose& pose) {
+  return g2o_information(known_motion(pose));
 }
 
 std::string to_g2o_edge(const RelativePose& pose, int match, int query) {
-  const cv::Matx66d information = g2o_information(pose);
-  std::string line = fmt::format("EDGE_SE3:QUAT {} {} {}", match, query, to_tum_pose(pose));
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column)
-      line += fmt::format(" {:.9g}", information(row, column));
-  }
-  return line;
+  return to_g2o_edge(known_motion(pose), match, query);
 }
+
+std::string to_tum_pose(const RelativePose& pose) { return to_tum_pose(pose.T_match_query); }
 
 }  // namespace loopbit

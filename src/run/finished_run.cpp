@@ -115,7 +115,7 @@ Status status_from(const Row& row, std::size_t column) {
   return *found;
 }
 
-/// See match_cell() in run_folder.cpp. `Found`: a Detection or a LateLoop.
+/// See match_cell() in run_folder.cpp. `Found`: a Detection, LateLoop or LoopPose.
 template <typename Found>
 void read_match(const Row& row, std::size_t column, Found& found) {
   const std::string_view cell = row.cell(column);
@@ -205,7 +205,8 @@ LoopPose loop_pose_from(const Row& row) {
   constexpr std::size_t kColumns = 16 + 21;
   row.check_columns(kColumns);
   LoopPose loop{.query = row.number<PlaceId>(0), .inliers = row.number<int>(13)};
-  if (row.cell(1).find(':') == std::string_view::npos) loop.match = row.number<PlaceId>(1);
+  read_match(row, 1, loop);
+  if (!loop.match && !loop.earlier_match) row.fail(1);
   RelativePose& pose = loop.pose;
   pose.status = named(row, 2, kAllPoseStatuses);
   pose.known = named(row, 3, kAllPoseKnown);

@@ -67,16 +67,19 @@ PoseFile::PoseFile(const std::string& folder, const CameraModel& camera, LengthS
   matched_.append("# timestamp x y z qx qy qz qw\n");
 }
 
-void PoseFile::add(const Detection& detection, const LoopDetector& detector) {
+std::span<const LoopPose> PoseFile::add(const Detection& detection, const LoopDetector& detector) {
+  const std::size_t before = poses_.size();
   shots_.push_back({detection.name, detection.timestamp_s});
   track_.add(detection.odometry);
   has_odometry_ = has_odometry_ || detection.odometry.has_value();
   for (const LateLoop& loop : detection.late_loops) add_loop(loop, detector);
-  if (detection.status != Status::loop) return;
-  add_loop({.frame = detection.frame,
-            .match = detection.match,
-            .earlier_match = detection.earlier_match},
-           detector);
+  if (detection.status == Status::loop) {
+    add_loop({.frame = detection.frame,
+              .match = detection.match,
+              .earlier_match = detection.earlier_match},
+             detector);
+  }
+  return std::span(poses_).subspan(before);
 }
 
 void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
@@ -94,7 +97,7 @@ void PoseFile::add_loop(const LateLoop& loop, const LoopDetector& detector) {
   }
   const int inliers = static_cast<int>(pose.inliers.size());
   pose.inliers = {};
-  poses_.push_back({loop.frame, loop.match, std::move(pose), inliers});
+  poses_.push_back({loop.frame, loop.match, loop.earlier_match, std::move(pose), inliers});
 }
 
 /// With an empty depth image where there should be a length, but nothing gives it.
@@ -152,7 +155,7 @@ void PoseFile::add_edge(const LateLoop& loop, const RelativePose& pose) {
   std::string lines;
   for (const PlaceId frame : {*loop.match, loop.frame}) {
     if (!vertices_.insert(frame).second) continue;
-    lines += fmt::format("VERTEX_SE3:QUAT {} {}\n", frame, to_tum_pose({}));
+    lines += fmt::format("VERTEX_SE3:QUAT {} {}\n", frame, to_tum_pose(cv::Matx44d::eye()));
   }
   graph_.append(lines + to_g2o_edge(pose, *loop.match, loop.frame) + '\n');
 }

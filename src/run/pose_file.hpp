@@ -6,6 +6,7 @@
 #include <fstream>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -37,9 +38,10 @@ class PoseFile {
   /// Measures the poses of its loops, also late ones, and hands the lines to the system. `detector`
   /// has the features of both frames. With odometry, and without depth and right images, the
   /// nearest frames before and after a match that are 0.5 m away from it give a length. Loops
-  /// between images of different shapes are left out: they cannot be from one camera. Throws Error
-  /// (kind output), and what features_of() throws.
-  void add(const Detection& detection, const LoopDetector& detector);
+  /// between images of different shapes are left out: they cannot be from one camera. Returns those
+  /// of poses() that are new, valid until the next call. Throws Error (kind output), and what
+  /// features_of() throws.
+  std::span<const LoopPose> add(const Detection& detection, const LoopDetector& detector);
 
   /// All that were measured so far, without their inliers.
   [[nodiscard]] const std::vector<LoopPose>& poses() const { return poses_; }

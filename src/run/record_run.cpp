@@ -7,6 +7,7 @@
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
@@ -238,17 +239,17 @@ class RecordedRun {
     folder_.write_record(record_);
   }
 
-  /// The map is saved and closed, even if this fails.
   void detect(const RunListener& listener, const std::atomic<bool>& stop) {
     const WallClock clock(record_.wall_s);
-    const std::shared_ptr<MapWriter> map = std::move(map_);
     LoopDetector detector = std::move(*detector_);
     std::optional<PoseFile> poses;
     if (camera_) poses.emplace(folder_.path(), *camera_, std::move(lengths_));
     RunListener recording{.on_detection =
                               [&](const Detection& detection) {
                                 folder_.add(detection);
-                                if (poses) poses->add(detection, detector);
+                                if (poses) {
+                                  save(poses->add(detection, detector));
+                                }
                                 listener.on_detection(detection);
                               },
                           .on_bad_frame = listener.on_bad_frame};
@@ -266,13 +267,9 @@ class RecordedRun {
     if (odometry_) odometry = [&](const Frame& frame) { return odometry_->next(frame); };
     run(input_, detector, recording, stop, odometry);
     record_.early_end = input_.early_end();
-    if (map) map_damage_ = map->damage();
+    if (map_) map_damage_ = map_->damage();
     if (poses) poses_ = poses->poses();
     if (evidence) evidence->finish();
-    if (map) {
-      map->finish();
-      record_.map_reconnections = map->reconnections();
-    }
     if (!stop && are_unreadable(folder_.detections())) {
       throw Error(ErrorKind::input, fmt::format("None of the {} frames of '{}' could be read; the "
                                                 "messages about them say why.",
@@ -280,22 +277,39 @@ class RecordedRun {
     }
   }
 
-  /// Corrects the trajectory, scores the detections, and stores truth and positions. `is_cut_off`:
-  /// by a stop.
-  void score(const RunListener& listener, bool is_cut_off) {
-    const std::size_t expected = frames_.times_s.size();
-    frames_.times_s = match_list(folder_.detections()).times_s;
-    frames_.all = frames_.all && frames_.times_s.size() == expected;
+  /// Corrects the trajectory, if asked to. Loops that the graph rejects are withdrawn, in the map,
+  /// too.
+  void correct(const RunListener& listener) {
     attempt([&] {
       if (odometry_) odometry_->check_used();
     });
-    std::optional<RunGraph> graph;
+    if (!request_.correct) return;
     attempt([&] {
-      if (request_.correct) graph = correct(listener);
+      graph_.emplace(folder_.detections(), poses_, request_.options.odometry);
+      const std::vector<LateLoop> rejected = graph_->rejected();
+      folder_.withdraw(rejected);
+      if (listener.on_rejected && !rejected.empty()) listener.on_rejected(rejected);
+      graph_->write(folder_.path());
+      for (const LateLoop& loop : rejected) {
+        if (map_) map_->reject({0, loop.frame}, {0, loop.match.value_or(0)});
+      }
     });
+  }
+
+  void close_map() {
+    if (!map_) return;
+    map_->finish();
+    record_.map_reconnections = map_->reconnections();
+  }
+
+  /// Scores the detections, and stores truth and positions. `is_cut_off`: by a stop.
+  void score(bool is_cut_off) {
+    const std::size_t expected = frames_.times_s.size();
+    frames_.times_s = match_list(folder_.detections()).times_s;
+    frames_.all = frames_.all && frames_.times_s.size() == expected;
     attempt([&] { write_score(); });
     attempt([&] { write_positions(is_cut_off); });
-    if (graph) record_.correction = graph->results(positions_m_);
+    if (graph_) record_.correction = graph_->results(positions_m_);
   }
 
   /// Writes the final run.json.
@@ -320,13 +334,14 @@ class RecordedRun {
     }
   }
 
-  RunGraph correct(const RunListener& listener) {
-    RunGraph graph(folder_.detections(), poses_, request_.options.odometry);
-    const std::vector<LateLoop> rejected = graph.rejected();
-    folder_.withdraw(rejected);
-    if (listener.on_rejected && !rejected.empty()) listener.on_rejected(rejected);
-    graph.write(folder_.path());
-    return graph;
+  /// In the map, if there is one.
+  void save(std::span<const LoopPose> poses) {
+    if (!map_) return;
+    for (const LoopPose& loop : poses) {
+      map_->add_pose({.query = {0, loop.query},
+                      .match = loop.earlier_match.value_or(SessionFrame{0, loop.match.value_or(0)}),
+                      .measured = known_motion(loop.pose)});
+    }
   }
 
   void write_score() {
@@ -355,12 +370,13 @@ class RecordedRun {
   LengthSources lengths_;  ///< until detect()
   std::optional<OdometryFile> odometry_;
   FramesRead frames_;               ///< expected, then read
-  std::shared_ptr<MapWriter> map_;  ///< null without one, and after detect()
+  std::shared_ptr<MapWriter> map_;  ///< null without one
   std::optional<LoopDetector> detector_;
   RunRecord record_;
   RunFolder folder_;
-  std::vector<LoopPose> poses_;  ///< after detect()
-  Positions positions_m_;        ///< after score(); empty if none are known
+  std::vector<LoopPose> poses_;    ///< after detect()
+  std::optional<RunGraph> graph_;  ///< after correct(); none without
+  Positions positions_m_;          ///< after score(); empty if none are known
   std::vector<std::string> map_damage_;
   std::optional<Error> fault_;
 };
@@ -391,6 +407,8 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
   RecordedRun run(input, request, expected, std::move(inputs));
   try {
     run.detect(listener, stop);
+    run.correct(listener);
+    run.close_map();
   } catch (const std::exception& error) {
     try {
       run.finish(error.what());
@@ -398,7 +416,7 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
     }
     throw;
   }
-  run.score(listener, stop);
+  run.score(stop);
   run.finish(stop ? "interrupt" : "end");
   return std::move(run).outcome();
 }

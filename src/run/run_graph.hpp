@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,9 +11,10 @@
 
 #include "loopbit/detection.hpp"
 #include "loopbit/finished_run.hpp"
-#include "loopbit/loop_graph.hpp"
 #include "loopbit/odometry.hpp"
 #include "loopbit/run_record.hpp"
+
+#include "session_graph.hpp"
 
 namespace loopbit {
 
@@ -29,37 +31,18 @@ class RunGraph {
   /// The loops that the graph rejects, by frame, as withdrawn ones.
   [[nodiscard]] std::vector<LateLoop> rejected() const;
 
-  /// Writes trajectory.csv, corrected.tum, judged_loops.csv and graph.g2o, and corrected.kitti if
-  /// all frames have odometry; see docs/run_folder.md. Throws Error (kind output).
+  /// See SessionGraph.
   void write(const std::string& folder) const;
 
   /// `positions_m`: true ones, one per frame; empty = not known.
   [[nodiscard]] Correction results(const std::vector<std::optional<cv::Vec3d>>& positions_m) const;
 
  private:
-  struct Keyframe {
-    PlaceId frame = 0;
-    std::optional<double> time_s;
-    cv::Matx44d T_odometry_camera;  ///< as odometry has it
-  };
-
-  void add_keyframe(const Detection& detection, const OdometryDrift& drift);
   void add_loops(const std::vector<Detection>& detections, const std::vector<LoopPose>& poses);
-  [[nodiscard]] cv::Matx44d corrected(std::size_t keyframe) const;
-  [[nodiscard]] std::string trajectory_rows() const;
-  [[nodiscard]] std::string loop_rows() const;
 
-  LoopGraph graph_;
-  std::vector<Keyframe> keyframes_;
-  std::vector<std::optional<int>> keyframe_of_;  ///< by frame
-  std::vector<LateLoop> loops_;                  ///< of the graph's loops, by their numbers
-  int unjudged_ = 0;
+  std::int64_t frames_;
+  SessionGraph graph_;
+  std::vector<LateLoop> loops_;  ///< of the graph's loops, by their numbers
 };
-
-/// The headers of trajectory.csv and judged_loops.csv, without a line end.
-inline constexpr const char* kTrajectoryHeader =
-    "frame,keyframe,odometry_x_m,odometry_y_m,odometry_z_m,x_m,y_m,z_m";
-inline constexpr const char* kJudgedLoopsHeader =
-    "query,match,verdict,known,odometry_chi2,compared,agreeing,chi2,limit";
 
 }  // namespace loopbit

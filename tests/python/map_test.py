@@ -199,6 +199,36 @@ def test_reader(made, images):
     assert map.damage == [] and map.check_structure() == []
 
 
+def test_sessions_are_corrected_together(town, images, tmp_path):
+    path, poses = tmp_path / "map.db", []
+    for session in (1, 2):
+        with loopbit.MapWriter(path, loopbit.LoopDetectorOptions(), "lap") as map:
+            detector = loopbit.LoopDetector(map=map)
+            for k in range(12):
+                pose = np.eye(4)
+                pose[2, 3] = 2.25 * k + session
+                detector.process(images[k], float(k), odometry=pose)
+                poses.append(pose)
+    map = loopbit.MapReader(path)
+    odometry = map.odometry()
+    assert odometry["session"].tolist() == [1] * 12 + [2] * 12 and odometry["timestamp_s"][13] == 1
+    assert np.array_equal(odometry["pose"], poses)
+    assert odometry["covariance"].shape == (24, 6, 6) and (odometry["covariance"][:, 0, 0] > 0).all()
+    folder = tmp_path / "graph"
+    folder.mkdir()
+    result = loopbit.correct_map(map, folder)
+    assert (result.keyframes, result.unjudged, result.rejected) == (24, 0, [])
+    assert result.kept == len(map.loops()) > 5 and result.frame_of == {1: 1, 2: 1}
+    assert len((folder / "corrected_2.tum").read_text().splitlines()) == 13
+    wrong = map.loops()[0]
+    pair = (loopbit.SessionFrame(int(wrong["query_session"]), int(wrong["query_frame"])),
+            loopbit.SessionFrame(int(wrong["match_session"]), int(wrong["match_frame"])))
+    loopbit.reject_loops(path, [pair])
+    assert len(map.rejected_loops()) == 1 and loopbit.correct_map(map).kept == result.kept - 1
+    with pytest.raises(loopbit.InputError, match="no odometry"):
+        loopbit.correct_map(loopbit.MapReader(town))
+
+
 def test_session_frames_are_values():
     frame = loopbit.SessionFrame(session=1, frame=17)
     assert frame == loopbit.SessionFrame(1, 17) != loopbit.SessionFrame(2, 17)

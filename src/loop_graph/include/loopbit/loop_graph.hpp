@@ -131,6 +131,10 @@ class LoopGraph {
   /// world, also for keyframes that loops or odometry connect to it. Others have their own.
   [[nodiscard]] cv::Matx44d pose(int keyframe) const;
 
+  /// For each keyframe, the one that is the world of its pose(): the first that odometry and kept
+  /// loops connect it to.
+  [[nodiscard]] std::vector<int> worlds() const;
+
   /// The motion that odometry gave between the keyframe before and this one. None if there is none.
   [[nodiscard]] std::optional<Motion> odometry(int keyframe) const;
 

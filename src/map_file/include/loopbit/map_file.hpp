@@ -14,8 +14,10 @@
 
 #include "loopbit/binary_content.hpp"
 #include "loopbit/detection.hpp"
+#include "loopbit/known_motion.hpp"
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/map_storage.hpp"
+#include "loopbit/odometry.hpp"
 #include "loopbit/surf.hpp"
 
 namespace loopbit {
@@ -50,6 +52,21 @@ struct MapLoop {
   int inliers = 0;
 
   bool operator==(const MapLoop&) const = default;
+};
+
+/// What odometry said at a frame, whether it is a place or not.
+struct MapOdometry {
+  SessionFrame at;
+  std::optional<double> timestamp_s = std::nullopt;
+  /// Always with the covariance of the motion since the frame with odometry before.
+  OdometryPose pose = {};
+};
+
+/// The relative pose of a loop, as the run measured it that found the loop.
+struct MapLoopPose {
+  SessionFrame query;
+  SessionFrame match;
+  KnownMotion measured = {};  ///< T_from_to is T_match_query
 };
 
 /// The images of a map and their total size.
@@ -95,8 +112,19 @@ class MapReader : public MapStorage {
   /// The undamaged loops, in the order in which they were found.
   [[nodiscard]] std::vector<MapLoop> loops();
 
-  /// The undamaged loops that LoopDetector::reject() withdrew.
+  /// The undamaged loops that LoopDetector::reject() or a pose graph withdrew.
   [[nodiscard]] std::vector<MapLoop> rejected_loops();
+
+  /// The undamaged odometry of all frames that have some, by session and frame.
+  [[nodiscard]] std::vector<MapOdometry> odometry();
+
+  /// The undamaged relative poses, also of loops that were rejected later, in the order in which
+  /// they were measured.
+  [[nodiscard]] std::vector<MapLoopPose> loop_poses();
+
+  /// What is known of the motion from match to query of each of `loops`, as it was measured last;
+  /// nothing if it was not, or is damaged.
+  [[nodiscard]] std::vector<KnownMotion> motions_of(const std::vector<MapLoop>& loops);
 
   /// None if they are damaged or missing.
   [[nodiscard]] std::optional<Features> features_of(const MapPlace& place);
@@ -172,6 +200,10 @@ class MapWriter : public MapStorage {
 
   /// How often the server of the map was lost, and its frames saved when it was back.
   [[nodiscard]] int reconnections() const;
+
+  /// Saves the relative pose of a loop, unless nothing of it is known. Session 0 is this session.
+  /// Throws Error (kind output).
+  void add_pose(const MapLoopPose& pose);
 
   /// Commits all frames added so far. Throws Error (kind output).
   void flush();

@@ -61,6 +61,11 @@ LinkCounts link_map(const std::string& path,
                     const std::optional<LoopDetectorOptions>& options = std::nullopt,
                     const std::function<bool(const LinkCounts&)>& progress = {});
 
+/// Moves loops to those that are rejected, in one commit, as LoopDetector::reject() does: they are
+/// not exported, later sessions do not use them, and link_map() does not find them again. Throws
+/// Error: kind output if the map has a writer or cannot be written, input if it is damaged.
+void reject_loops(const std::string& path, const std::vector<MapLoop>& loops);
+
 /// Copies all undamaged rows of a map to a new map, under the same numbers. A session whose
 /// description is lost is named "recovered". A map begun by version 1 loses its images with its
 /// first page. Throws Error: kind output if `to` exists or cannot be written, input if there is

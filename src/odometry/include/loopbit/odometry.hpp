@@ -61,8 +61,16 @@ Motion chained(const Motion& first, const Motion& second);
 /// the camera stands still.
 cv::Matx66d drift_covariance(const cv::Matx44d& T_from_to, const OdometryDrift& drift);
 
-/// Throws Error (kind input) unless `pose` is finite and rigid (to 0.001), and its covariance, if
-/// there is one, is finite, symmetric and positive definite. The message begins with `name`.
+/// The motion since the last frame with odometry, where its pose was `before`. The covariance is
+/// that of `pose`; if it has none, that of `drift`.
+Motion odometry_step(const cv::Matx44d& before, const OdometryPose& pose,
+                     const OdometryDrift& drift);
+
+/// Whether `pose` is finite and rigid (to 0.001), and its covariance, if there is one, is finite,
+/// symmetric and positive definite.
+bool is_valid(const OdometryPose& pose);
+
+/// Throws Error (kind input) unless it is. The message begins with `name`.
 void check_odometry(const OdometryPose& pose, const std::string& name);
 
 /// Odometry along a session, with the drift between any two of its frames. Memory: 450 bytes per

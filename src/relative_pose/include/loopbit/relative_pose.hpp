@@ -14,6 +14,7 @@
 #include <opencv2/core.hpp>
 
 #include "loopbit/camera.hpp"
+#include "loopbit/known_motion.hpp"
 #include "loopbit/options.hpp"
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
@@ -36,14 +37,6 @@ inline constexpr std::array kAllPoseStatuses{PoseStatus::measured,        PoseSt
                                              PoseStatus::little_parallax, PoseStatus::plane,
                                              PoseStatus::ambiguous};
 
-/// How much of a relative pose is known.
-enum class PoseKnown {
-  nothing,
-  rotation,
-  direction,  ///< rotation, and the direction of the translation
-  metric,     ///< rotation, and the translation in metres
-};
-
 /// What came of the search for the length of the translation.
 enum class ScaleStatus {
   not_asked,  ///< neither depth nor a baseline was given
@@ -53,16 +46,12 @@ enum class ScaleStatus {
   few_points,   ///< too few matches have a depth, or their depths are too uncertain
 };
 
-inline constexpr std::array kAllPoseKnown{PoseKnown::nothing, PoseKnown::rotation,
-                                          PoseKnown::direction, PoseKnown::metric};
-
 inline constexpr std::array kAllScaleStatuses{ScaleStatus::not_asked, ScaleStatus::known,
                                               ScaleStatus::no_depth, ScaleStatus::no_baseline,
                                               ScaleStatus::few_points};
 
 /// The enumerators' names.
 std::string_view to_string(PoseStatus status);
-std::string_view to_string(PoseKnown known);
 std::string_view to_string(ScaleStatus status);
 
 struct RelativePoseOptions {
@@ -170,17 +159,12 @@ inline constexpr double kTumDepthUnitsPerM = 5000;
 /// Throws Error (kind input) for another type.
 cv::Mat1f depth_in_metres(const cv::Mat& depth, double units_per_m = kTumDepthUnitsPerM);
 
-/// The inverse covariance, as g2o's EDGE_SE3:QUAT expects it: of (x, y, z, qx, qy, qz), in which a
-/// quaternion's vector is half a rotation vector. What is not known has no information: if only the
-/// direction is known, that is the whole translation, since its length is unknown.
+/// What is known of the pose, as a motion from the match to the query.
+KnownMotion known_motion(const RelativePose& pose);
+
+/// The functions of known_motion.hpp for what is known of a pose.
 cv::Matx66d g2o_information(const RelativePose& pose);
-
-/// A pose as the line `EDGE_SE3:QUAT match query x y z qx qy qz qw` and the upper triangle of
-/// g2o_information(), in g2o's text format.
 std::string to_g2o_edge(const RelativePose& pose, int match, int query);
-
-/// Position and unit quaternion `x y z qx qy qz qw` of T_match_query, as TUM trajectories and g2o
-/// write them.
 std::string to_tum_pose(const RelativePose& pose);
 
 }  // namespace loopbit

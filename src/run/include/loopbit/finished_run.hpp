@@ -21,8 +21,9 @@ namespace loopbit {
 /// The relative pose of a loop, as relative_poses.csv has it.
 struct LoopPose {
   PlaceId query = 0;
-  std::optional<PlaceId> match = std::nullopt;  ///< none: a frame of an earlier session
-  RelativePose pose = {};                       ///< without the list of its inliers
+  std::optional<PlaceId> match = std::nullopt;               ///< as in Detection
+  std::optional<SessionFrame> earlier_match = std::nullopt;  ///< as in Detection
+  RelativePose pose = {};                                    ///< without the list of its inliers
   int inliers = 0;
 };
 
