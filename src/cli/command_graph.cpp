@@ -80,8 +80,8 @@ void print_sessions(const std::vector<MapCorrection::Session>& sessions) {
 
 void print_summary(const MapCorrection& result, const GraphFlags& flags) {
   const Correction& correction = result.correction;
-  fmt::print("map        {}, {} sessions, {} frames with odometry\n", printable(flags.map),
-             result.sessions.size(), correction.keyframes);
+  fmt::print("map        {}, {} session{}, {} frames with odometry\n", printable(flags.map),
+             result.sessions.size(), result.sessions.size() == 1 ? "" : "s", correction.keyframes);
   print_sessions(result.sessions);
   fmt::print("graph      {} loops kept, {} rejected{}\n", correction.kept(), correction.rejected(),
              evidence_text(correction));
