@@ -6,10 +6,12 @@
     fleet_command_test.py LOOPBIT FLEET_MAP_TEST [--quick] [unittest arguments]
 """
 
+import contextlib
 import json
 import os
 import pathlib
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
@@ -133,6 +135,29 @@ class FleetTest(CommandTest):
         self.assertIn("2 sessions", self.lines("map", "merge", copy, self.town)[0])
         self.assertIn("linked     2 sessions", self.lines("map", "link", copy)[0])
         self.server.sql("copy", "DROP SCHEMA loopbit CASCADE")
+
+    def test_odometry_and_poses_are_kept_as_in_a_file(self):
+        self.server.sql("postgres", "CREATE DATABASE driven")
+        address, file, back = self.server.address("driven"), self.scratch / "a.db", self.scratch / "b.db"
+        self.lines("map", "create", address)
+        for number, map_path in enumerate((file, address)):
+            ran = loopbit("run", self.dataset, "--odometry", self.dataset / "odometry.txt", "--map", map_path,
+                          "--no-report", "--out", self.scratch / str(number))
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.lines("map", "merge", back, address)
+
+        def rows_in(path, columns):
+            with contextlib.closing(sqlite3.connect(path)) as database:
+                return database.execute(f"SELECT {columns}, session, frame, pose, checksum FROM "
+                                        f"{'odometry' if columns == 'timestamp' else 'relative_pose'}").fetchall()
+
+        self.assertEqual(len(rows_in(file, "timestamp")), FRAMES)
+        self.assertTrue(QUICK or rows_in(file, "match_session, match_frame, known"))
+        for columns in ("timestamp", "match_session, match_frame, known"):
+            self.assertEqual(rows_in(back, columns), rows_in(file, columns))
+        shown = self.server.address("driven", password=None)
+        of_file, of_server = ["\n".join(self.lines("graph", map_path)) for map_path in (file, address)]
+        self.assertEqual(without(of_server, shown), without(of_file, file))
 
     def test_faults_are_told_with_a_remedy(self):
         def fails(code, words, *arguments):
