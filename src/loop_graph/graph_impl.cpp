@@ -226,7 +226,7 @@ std::vector<int> GraphImpl::worlds() const {
 std::vector<int> GraphImpl::roots() const {
   std::vector<int> found = worlds();
   std::ranges::sort(found);
-  found.erase(std::ranges::unique(found).begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
 
