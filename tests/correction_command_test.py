@@ -9,10 +9,10 @@ import pathlib
 import subprocess
 import unittest
 
-from loopbit_command import FRAMES, QUICK, CommandTest, loopbit
+from loopbit_command import FRAMES, CommandTest, loopbit
 
 # Two storeys that look the same, a lap and a piece on each.
-STOREYS = ["--frames", 80 if QUICK else 240, "--world", f"spacing_m={4.5 if QUICK else 1.5}", "--world",
+STOREYS = ["--frames", 240, "--world", "spacing_m=1.5", "--world",
            "floors=2", "--world", "laps=1.3", "--world", "width_px=320", "--world", "height_px=240"]
 # The detector then takes odometry for no reason against a place.
 NO_GATE = ["--set", "decision.reach_m=1000", "--set", "decision.reach_up_m=1000"]
@@ -58,7 +58,6 @@ class CorrectionTest(CommandTest):
         self.assertEqual(told[-len(rejected):], rejected)
         self.assertEqual(lines[-1]["run"]["correction"], self.record["correction"])
 
-    @unittest.skipIf(QUICK, "what is found in wider steps is not judged")
     def test_wrong_loops_go_and_the_trajectory_is_corrected(self):
         score = self.record["score"]
         self.assertGreater(score["wrong"], 50, "without the gate, storeys are confused")
@@ -121,7 +120,6 @@ class CorrectionTest(CommandTest):
         self.assertEqual(times, list(range(len(times))), "frames take the place of times")
         self.assertEqual({loop["known"] for loop in table(self.out / "judged_loops.csv")}, {"nothing"})
 
-    @unittest.skipIf(QUICK, "what is found in wider steps is not judged")
     def test_wrong_odometry_loses_no_loops_silently(self):
         truth = ["--truth", self.dataset / "truth.csv", "--not-false", self.dataset / "not_false.csv"]
         flags = [self.dataset, *truth, "--no-report", "--quiet", "--overwrite", "--out", self.out]
