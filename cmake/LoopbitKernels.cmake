@@ -11,6 +11,7 @@ function(loopbit_kernels part)
   elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64|ARM64")
     list(APPEND sets dotprod)
   endif()
+  set_property(GLOBAL PROPERTY LOOPBIT_INSTRUCTION_SETS ${sets})
   # The compiler makes vector code of these loops at -O3. There are no NaNs or infinities in them, and
   # no sign of zero matters: none of this changes a result.
   set(loops -O3 -fno-math-errno -fno-trapping-math -ffinite-math-only -fno-signed-zeros)

@@ -25,6 +25,29 @@ def programs():
     return found[-1].parent
 
 
+def programs_with(extension, folder):
+    """The folder of the same server with an extension, whose files are in a folder of their own. A server
+    looks for them in places relative to its program. So a copy of the program sees the extension, and the
+    installed server does not."""
+    installed = programs()
+    version = installed.parent.name
+    root, system = folder / "usr", pathlib.Path("/usr")
+    links = [f"lib/postgresql/{version}/lib", f"share/postgresql/{version}", f"share/postgresql/{version}/extension"]
+    for part in links:
+        (root / part).mkdir(parents=True)
+        for file in (system / part).iterdir():
+            if str((root / part / file.name).relative_to(root)) not in links:
+                (root / part / file.name).symlink_to(file)
+    copies = root / "lib/postgresql" / version / "bin"
+    copies.mkdir()
+    for program in ("initdb", "pg_ctl", "postgres"):
+        shutil.copy(installed / program, copies)
+    shutil.copy(extension / "loopbit.so", root / links[0])
+    for file in (*extension.glob("loopbit*.control"), *extension.glob("loopbit--*.sql")):
+        shutil.copy(file, root / links[2])
+    return copies
+
+
 def free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -40,13 +63,15 @@ def is_running(process):
 
 
 class PostgresServer:
-    """A running server, whose superuser is "admin". With `safe`, commits are on disk."""
+    """A running server, whose superuser is "admin". With `safe`, commits are on disk. `extension`: the folder
+    of a build with loopbit.so and what belongs to it; the server has it then."""
 
-    def __init__(self, safe=False):
+    def __init__(self, safe=False, extension=None):
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="loopbit_pg_"))
         self.data = self.folder / "data"
         self.port = free_port()
         self.process = None
+        self.programs = programs_with(extension, self.folder) if extension else programs()
         self.as_nobody = {}
         if os.geteuid() == 0:
             shutil.chown(self.folder, "nobody", "nogroup")
@@ -64,7 +89,7 @@ class PostgresServer:
 
     def call(self, program, *arguments):
         """Runs one of the server's programs."""
-        subprocess.run([programs() / program, *map(str, arguments)], check=True, cwd=self.folder,
+        subprocess.run([self.programs / program, *map(str, arguments)], check=True, cwd=self.folder,
                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, **self.as_nobody)
 
     def start(self):

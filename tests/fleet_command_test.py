@@ -3,7 +3,9 @@
 # SPDX-License-Identifier: MIT
 """Maps on a PostgreSQL server, which this starts: the command, and the program fleet_map_test.
 
-    fleet_command_test.py LOOPBIT FLEET_MAP_TEST [--quick] [unittest arguments]
+    fleet_command_test.py LOOPBIT FLEET_MAP_TEST [--search DIR] [--quick] [unittest arguments]
+
+--search: where the extension of the server is.
 """
 
 import contextlib
@@ -18,6 +20,10 @@ import time
 import unittest
 
 FLEET_MAP_TEST = sys.argv.pop(2)
+SEARCH = None
+if sys.argv[2:3] == ["--search"]:
+    SEARCH = pathlib.Path(sys.argv[3])
+    del sys.argv[2:4]
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "scripts"))
 
 from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, decisions, loopbit    # noqa: E402
@@ -36,7 +42,7 @@ class FleetTest(CommandTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.server = PostgresServer()
+        cls.server = PostgresServer(extension=SEARCH)
         cls.addClassCleanup(cls.server.close)
         cls.server.sql("postgres", "CREATE DATABASE town", "CREATE DATABASE copy", "CREATE DATABASE empty",
                        "CREATE DATABASE cpp")
@@ -211,6 +217,45 @@ class FleetTest(CommandTest):
         for command in ("check", "export"):
             self.assertEqual(self.lines("map", command, address), self.lines("map", command, self.file))
 
+    @unittest.skipUnless(SEARCH, "the extension was not built")
+    def test_the_index_of_contents_survives_a_crash(self):
+        self.server.sql("postgres", "CREATE DATABASE crash")
+        self.server.sql(
+            "crash", "CREATE EXTENSION loopbit", "CREATE TABLE t (id integer, c binary_content)",
+            "CREATE INDEX i ON t USING loopbit (c)", "CREATE UNLOGGED TABLE u (LIKE t INCLUDING INDEXES)",
+            "INSERT INTO t SELECT n, (SELECT string_agg(sha512((n / 20 + part)::text::bytea), '' ORDER BY part) "
+            "FROM generate_series(1, 8) AS part)::binary_content FROM generate_series(1, 3000) AS n",
+            "INSERT INTO u SELECT * FROM t", "DELETE FROM t WHERE id % 3 = 0")
+        self.server.sql("crash", "VACUUM t")
+        self.server.kill()
+        self.server.start()
+        nearest = ("SELECT id FROM (SELECT id, c <~> (SELECT c FROM t WHERE id = 1000) AS far FROM t ORDER BY far "
+                   "FETCH FIRST 50 ROWS WITH TIES) AS nearest ORDER BY far, id")
+        for _ in range(2):
+            found, scanned = [self.server.sql("crash", f"SET {off} = off", nearest)
+                              for off in ("enable_seqscan", "enable_indexscan")]
+            self.assertEqual(found, scanned)
+            self.assertGreaterEqual(len(found.splitlines()), 50)
+            self.server.sql("crash", "INSERT INTO t SELECT id + 5000, c FROM t")
+        self.assertEqual(self.server.sql("crash", "SELECT count(*) FROM u"), "0\n")
+        self.server.sql("crash", "INSERT INTO u SELECT * FROM t")
+        self.assertEqual(self.server.sql("crash", "SET enable_seqscan = off", "SELECT count(*) FROM (SELECT FROM u "
+                                         "ORDER BY c <~> (SELECT c FROM t LIMIT 1)) AS all_rows"), "8000\n")
+
+    @unittest.skipUnless(SEARCH, "the extension was not built")
+    def test_readers_may_search_on_the_server(self):
+        nearest = ("SET enable_seqscan = off; SELECT frame FROM loopbit.place ORDER BY content::loopbit.binary_content "
+                   "OPERATOR(loopbit.<~>) (SELECT content FROM loopbit.place WHERE session = 1 AND frame = 3)"
+                   "::loopbit.binary_content LIMIT 1")
+        for user in ("viewer", "robot2"):
+            ran = subprocess.run(["psql", "-X", "-q", "-A", "-t", "-c", nearest, "-c", "EXPLAIN " + nearest.split("; ")[1],
+                                  self.server.address("town", user)], capture_output=True, text=True)
+            self.assertEqual(ran.stdout.splitlines()[0], "3", ran.stderr)
+            self.assertIn("Index Scan using place_content", ran.stdout)
+        for statement in ("CREATE FUNCTION loopbit.similarity(int) RETURNS int LANGUAGE sql AS 'SELECT 1'",
+                          "DROP EXTENSION loopbit", "ALTER EXTENSION loopbit UPDATE", "DROP INDEX loopbit.place_content"):
+            self.assertRegex(self.as_robot2(statement).stderr, "must be owner|permission denied", statement)
+
     def test_a_newer_version_is_refused(self):
         self.server.sql("town", "INSERT INTO loopbit.migration (version) VALUES (99)")
         try:
@@ -257,7 +302,7 @@ class FleetTest(CommandTest):
             "pg_constraint WHERE contype = 'c' AND connamespace = 'loopbit'::regnamespace")
         at = "session = 1 AND frame ="
         self.server.sql(
-            "copy", checks, f"UPDATE loopbit.place SET content = 'short' WHERE {at} 1",
+            "copy", "DROP INDEX IF EXISTS loopbit.place_content", checks, f"UPDATE loopbit.place SET content = 'short' WHERE {at} 1",
             f"UPDATE loopbit.place SET timestamp = 'NaN' WHERE {at} 2",
             f"UPDATE loopbit.place SET checksum = checksum + 1 WHERE {at} 3",
             f"UPDATE loopbit.place SET content = decode(repeat('00', 600000), 'hex') WHERE {at} 4",

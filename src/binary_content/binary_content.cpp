@@ -3,19 +3,14 @@
 #include "loopbit/binary_content.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <vector>
 
 #include <opencv2/imgproc.hpp>
 
 #include "loopbit/gray_image.hpp"
 #include "loopbit/image_shrinker.hpp"
-#include "loopbit/kernels_for.hpp"
-
-#include "overlap_kernels.hpp"
 
 namespace loopbit {
 namespace {
@@ -105,12 +100,6 @@ cv::Mat2f residual_spectrum(const cv::Mat2f& spectrum, int radius) {
   return residual;
 }
 
-int overlap(const BinaryContent& a, const BinaryContent& b) {
-  int set = 0;
-  for (std::size_t y = 0; y < a.rows.size(); ++y) set += std::popcount(a.rows[y] & b.rows[y]);
-  return set;
-}
-
 template <typename Visit>
 void for_each_pixel(const Visit& visit) {
   for (int y = 0; y < kContentSide; ++y) {
@@ -127,66 +116,6 @@ void set_pixel(BinaryContent& content, int x, int y) {
 }
 
 }  // namespace
-
-int count(const BinaryContent& content) {
-  int set = 0;
-  for (const std::uint64_t row : content.rows) set += std::popcount(row);
-  return set;
-}
-
-cv::Point2d center(const BinaryContent& content) {
-  std::int64_t sum_x = 0;
-  std::int64_t sum_y = 0;
-  std::int64_t set = 0;
-  for (int y = 0; y < kContentSide; ++y) {
-    const std::uint64_t row = content.rows[static_cast<std::size_t>(y)];
-    set += std::popcount(row);
-    sum_y += std::int64_t{y} * std::popcount(row);
-    for (std::uint64_t bits = row; bits != 0; bits &= bits - 1) sum_x += std::countr_zero(bits);
-  }
-  if (set == 0) return {(kContentSide - 1) / 2.0, (kContentSide - 1) / 2.0};
-  const auto n = static_cast<double>(set);
-  return {static_cast<double>(sum_x) / n, static_cast<double>(sum_y) / n};
-}
-
-BinaryContent shift_columns(const BinaryContent& content, int columns) {
-  if (std::abs(columns) >= kContentSide) return {};
-  BinaryContent shifted;
-  std::transform(
-      content.rows.begin(), content.rows.end(), shifted.rows.begin(),
-      [&](std::uint64_t row) { return columns >= 0 ? row << columns : row >> -columns; });
-  return shifted;
-}
-
-std::vector<BinaryContent> tolerated_shifts(const BinaryContent& content, int tolerance_columns) {
-  std::vector<BinaryContent> shifted;
-  for (int columns = -tolerance_columns; columns <= tolerance_columns; ++columns) {
-    if (columns % 2 != 0 && std::abs(columns) != tolerance_columns) continue;
-    shifted.push_back(shift_columns(content, columns));
-  }
-  return shifted;
-}
-
-double similarity(const BinaryContent& a, const BinaryContent& b, int shift_tolerance_columns) {
-  const int larger = std::max(count(a), count(b));
-  if (larger == 0) return 0.0;
-  int best = 0;
-  for (const BinaryContent& shifted : tolerated_shifts(a, shift_tolerance_columns)) {
-    best = std::max(best, overlap(shifted, b));
-  }
-  return static_cast<double>(best) / larger;
-}
-
-void max_overlaps(std::span<const BinaryContent> queries, std::span<const BinaryContent> places,
-                  std::span<std::uint16_t> overlaps, InstructionSet instruction_set) {
-  static_assert(sizeof(BinaryContent) == kContentWords * sizeof(std::uint64_t));
-  assert(overlaps.size() >= places.size());
-  const auto words = [](std::span<const BinaryContent> contents) {
-    return reinterpret_cast<const std::uint64_t*>(contents.data());
-  };
-  kernels_for<OverlapKernels>(instruction_set)
-      .max_overlaps(words(queries), queries.size(), words(places), places.size(), overlaps.data());
-}
 
 cv::Mat1f saliency_map(const cv::Mat1b& gray, const BinaryContentOptions& options) {
   validate(options, "binary_content");

@@ -147,11 +147,24 @@ BEGIN
 END
 $$)";
 
+/// If the server has the extension and the user may load it, similar places are found on the
+/// server.
+constexpr const char* kSearch = R"(
+DO $$
+BEGIN
+  IF EXISTS (SELECT FROM pg_roles WHERE rolname = current_user AND rolsuper)
+    AND EXISTS (SELECT FROM pg_available_extensions WHERE name = 'loopbit' AND installed_version IS NULL) THEN
+    CREATE EXTENSION loopbit SCHEMA loopbit;
+    CREATE INDEX place_content ON place USING loopbit ((content::binary_content));
+  END IF;
+END
+$$)";
+
 }  // namespace
 
 void create_tables(const Connection& connection) {
   connection.execute(kRoles);
-  for (const char* part : {kTables, kFunctions, kRights}) connection.execute(part);
+  for (const char* part : {kTables, kFunctions, kRights, kSearch}) connection.execute(part);
   connection.run("INSERT INTO migration (version) VALUES ($1)", {parameter(kFleetVersion)});
 }
 

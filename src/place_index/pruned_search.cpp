@@ -13,9 +13,6 @@
 namespace loopbit {
 namespace {
 
-/// Shifts are bounded one by one up to so many; beyond, neighbours together.
-constexpr std::size_t kMaxShiftGroups = 16;
-
 /// Groups of coarsest stretches that one call of a kernel bounds; they lie in one chunk.
 constexpr std::size_t kGroupRun = 128;
 
@@ -68,26 +65,12 @@ PrunedSearch::PrunedSearch(const PlaceStore& store, PlaceId end, const BinaryCon
       num_groups_(end_ / kGroupPlaces),
       query_count_(static_cast<std::uint16_t>(count(query))),
       query_center_(center(query)),
+      shifts_(query, options.shift_tolerance_columns),
+      all_shifts_(static_cast<std::uint16_t>((1U << shifts_.group_counts.size()) - 1)),
       found_(options) {
-  prepare_shifts(query, options.shift_tolerance_columns);
-  all_shifts_ = static_cast<std::uint16_t>((1U << group_counts_.size()) - 1);
   coarse_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_ * kInterleaved *
-                                                                 coarse_counts_.size());
+                                                                 shifts_.coarse_counts.size());
   largest_sums_ = std::make_unique_for_overwrite<std::uint16_t[]>(num_groups_);
-}
-
-void PrunedSearch::prepare_shifts(const BinaryContent& query, int tolerance_columns) {
-  shifted_ = tolerated_shifts(query, tolerance_columns);
-  shifts_per_group_ = (shifted_.size() + kMaxShiftGroups - 1) / kMaxShiftGroups;
-  for (std::size_t shift = 0; shift < shifted_.size(); ++shift) {
-    if (shift % shifts_per_group_ == 0) {
-      group_counts_.emplace_back();
-      coarse_counts_.emplace_back();
-    }
-    const BlockCounts counts = block_counts(shifted_[shift]);
-    raise(group_counts_.back(), counts);
-    raise(coarse_counts_.back(), coarse_counts(counts));
-  }
 }
 
 std::vector<Candidate> PrunedSearch::run() {
@@ -114,10 +97,10 @@ void PrunedSearch::bound_tail() {
 }
 
 void PrunedSearch::bound_coarse_stretches() {
-  const std::size_t shift_groups = coarse_counts_.size();
+  const std::size_t shift_groups = shifts_.coarse_counts.size();
   for (std::size_t first = 0; first < num_groups_; first += kGroupRun) {
     const std::size_t groups = std::min(kGroupRun, num_groups_ - first);
-    kernels_.coarse_sums(coarse_counts_.front().of.data(), shift_groups,
+    kernels_.coarse_sums(shifts_.coarse_counts.front().of.data(), shift_groups,
                          store_.coarse_group(first)->of.data(), groups,
                          &coarse_sums_[first * kInterleaved * shift_groups], &largest_sums_[first]);
   }
@@ -150,7 +133,7 @@ void PrunedSearch::bound_sums_between(std::size_t lower, std::size_t upper) {
   Selection selection{.lower = static_cast<std::uint16_t>(std::max(lower, least)),
                       .upper = static_cast<std::uint16_t>(upper),
                       .query_count = query_count_};
-  const std::size_t shift_groups = coarse_counts_.size();
+  const std::size_t shift_groups = shifts_.coarse_counts.size();
   std::array<Selected, kGroupRun * kInterleaved> selected;  // NOLINT: written before it is read
   for (std::size_t group = 0; group < num_groups_; group += kGroupRun) {
     const std::size_t first = group * kInterleaved;
@@ -228,8 +211,8 @@ void PrunedSearch::bound_run(std::size_t level) {
   Run& run = runs_[level];
   if (run.size == 0) return;
   std::array<Reached, kRun> reached;  // NOLINT: written before it is read
-  kernels_.reaching_queries(group_counts_.front().of.data(), run.shifts.data(), run.maxima.data(),
-                            run.size, run.least_sums.data(), reached.data());
+  kernels_.reaching_queries(shifts_.group_counts.front().of.data(), run.shifts.data(),
+                            run.maxima.data(), run.size, run.least_sums.data(), reached.data());
   // Which ones are kept is hard to foresee: gathering them first takes no branch.
   std::array<Stretch, kRun> kept;  // NOLINT: written before it is read
   std::size_t num_kept = 0;
@@ -259,10 +242,10 @@ void PrunedSearch::compare_stretch(const Stretch& stretch) {
   const std::size_t first = stretch.number * kFinestPlaces;
   std::array<std::uint16_t, kFinestPlaces> best{};
   for (unsigned left = stretch.shifts; left != 0; left &= left - 1) {
-    const std::size_t shift = static_cast<std::size_t>(std::countr_zero(left)) * shifts_per_group_;
+    const std::size_t shift = static_cast<std::size_t>(std::countr_zero(left)) * shifts_.per_group;
     std::array<std::uint16_t, kFinestPlaces> overlaps{};
-    const std::size_t shifts = std::min(shifts_per_group_, shifted_.size() - shift);
-    max_overlaps(std::span(shifted_).subspan(shift, shifts),
+    const std::size_t shifts = std::min(shifts_.per_group, shifts_.shifted.size() - shift);
+    max_overlaps(std::span(shifts_.shifted).subspan(shift, shifts),
                  std::span(&store_.content(first), kFinestPlaces), overlaps, instruction_set_);
     for (std::size_t i = 0; i < kFinestPlaces; ++i) best[i] = std::max(best[i], overlaps[i]);
   }
@@ -272,7 +255,7 @@ void PrunedSearch::compare_stretch(const Stretch& stretch) {
 
 void PrunedSearch::compare_place(std::size_t place) {
   std::uint16_t overlap = 0;
-  max_overlaps(shifted_, std::span(&store_.content(place), 1), std::span(&overlap, 1),
+  max_overlaps(shifts_.shifted, std::span(&store_.content(place), 1), std::span(&overlap, 1),
                instruction_set_);
   ++work_.contents;
   consider(place, overlap);

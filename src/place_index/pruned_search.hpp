@@ -16,6 +16,7 @@
 #include "bound_kernels.hpp"
 #include "found_places.hpp"
 #include "place_store.hpp"
+#include "query_shifts.hpp"
 #include "stretch_queue.hpp"
 
 namespace loopbit {
@@ -60,7 +61,6 @@ class PrunedSearch {
   [[nodiscard]] std::uint16_t larger_count(std::uint16_t count) const {
     return std::max(query_count_, count);
   }
-  void prepare_shifts(const BinaryContent& query, int tolerance_columns);
   void bound_tail();
   void bound_coarse_stretches();
   void search_coarse_stretches();
@@ -90,11 +90,8 @@ class PrunedSearch {
   std::size_t num_groups_;  ///< of coarsest stretches, all of them whole
   std::uint16_t query_count_;
   cv::Point2d query_center_;
-  std::vector<BinaryContent> shifted_;  ///< the query at each shift
-  std::size_t shifts_per_group_ = 1;
-  std::uint16_t all_shifts_ = 0;                   ///< a bit for each group of shifts
-  std::vector<BlockCounts> group_counts_;          ///< for each group of shifts, the maxima
-  std::vector<CoarseCounts> coarse_counts_;        ///< likewise
+  QueryShifts shifts_;
+  std::uint16_t all_shifts_;                       ///< a bit for each group of shifts
   std::unique_ptr<std::uint16_t[]> coarse_sums_;   ///< see BoundKernels::coarse_sums
   std::unique_ptr<std::uint16_t[]> largest_sums_;  ///< for each group of stretches
   FoundPlaces found_;
