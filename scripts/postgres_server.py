@@ -6,11 +6,13 @@ free port of 127.0.0.1, by a user without privileges."""
 import contextlib
 import os
 import pathlib
+import select
 import shutil
 import signal
 import socket
 import subprocess
 import tempfile
+import threading
 import time
 
 PASSWORD = "p%3Aw@rd/1"    # every letter of it has to be encoded in an address
@@ -99,14 +101,31 @@ class PostgresServer:
         except subprocess.CalledProcessError as error:
             raise RuntimeError(f"The server does not start:\n{log.read_text()}") from error
 
-    def kill(self):
-        """Ends all processes of the server at once."""
+    def processes(self):
+        """Of the server, all of them stopped."""
         postmaster = int((self.data / "postmaster.pid").read_text().splitlines()[0])
         os.kill(postmaster, signal.SIGSTOP)    # it begins no more
         children = pathlib.Path(f"/proc/{postmaster}/task/{postmaster}/children").read_text().split()
-        for process in (postmaster, *map(int, children)):
+        for process in map(int, children):
+            os.kill(process, signal.SIGSTOP)
+        return [postmaster, *map(int, children)]
+
+    @contextlib.contextmanager
+    def frozen(self):
+        """A server that does not answer, as if the network were cut."""
+        processes = self.processes()
+        try:
+            yield
+        finally:
+            for process in processes:
+                os.kill(process, signal.SIGCONT)
+
+    def kill(self):
+        """Ends all processes of the server at once."""
+        processes = self.processes()
+        for process in processes:
             os.kill(process, signal.SIGKILL)
-        while any(map(is_running, (postmaster, *children))):
+        while any(map(is_running, processes)):
             time.sleep(0.01)
         # Their zombies would be taken for a server that runs.
         for lock in (self.data / "postmaster.pid", self.folder / f".s.PGSQL.{self.port}.lock"):
@@ -115,6 +134,35 @@ class PostgresServer:
     def address(self, database, user="admin", password=ENCODED_PASSWORD):
         secret = f":{password}" if password else ""
         return f"postgresql://{user}{secret}@127.0.0.1:{self.port}/{database}"
+
+    @contextlib.contextmanager
+    def forgetful(self, database, answers, **login):
+        """The address of a server whose connection ends in place of the answer to a commit, so many times."""
+        with socket.create_server(("127.0.0.1", 0)) as door:
+            left = [answers]
+
+            def forward(client):
+                with client, socket.create_connection(("127.0.0.1", self.port)) as server:
+                    forgets = False
+                    while True:
+                        for source in select.select([client, server], [], [])[0]:
+                            data = source.recv(1 << 16)
+                            if not data or (forgets and source is server):
+                                return
+                            if source is client and b"end_batch" in data and left[0] > 0:
+                                left[0] -= 1
+                                forgets = True
+                            (server if source is client else client).sendall(data)
+
+            def serve():
+                with contextlib.suppress(OSError):    # the door is closed
+                    while True:
+                        threading.Thread(target=forward, args=(door.accept()[0],), daemon=True).start()
+
+            threading.Thread(target=serve, daemon=True).start()
+            address = self.address(database, **login)
+            yield address.replace(f":{self.port}/", f":{door.getsockname()[1]}/")
+            door.shutdown(socket.SHUT_RDWR)
 
     def sql(self, database, *statements):
         """What the statements print, without headings."""

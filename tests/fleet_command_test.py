@@ -9,6 +9,7 @@
 """
 
 import contextlib
+import csv
 import json
 import os
 import pathlib
@@ -30,6 +31,7 @@ from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, decisions, loop
 from postgres_server import ENCODED_PASSWORD, PASSWORD, PostgresServer    # noqa: E402
 
 HALF = FRAMES // 2
+LAPS = 5
 
 
 def without(text, *names):
@@ -60,6 +62,9 @@ class FleetTest(CommandTest):
         cls.fleet.mkdir()
         cls.runs = []
         images = sorted(cls.images.iterdir())
+        # Longer than a server is away.
+        cls.long = cls.shared / "long.txt"
+        cls.long.write_text("".join(f"{image}\n" for image in LAPS * images[HALF:]))
         for name, files in (("first", images[:HALF]), ("second", images[HALF:])):
             folder = cls.shared / name
             folder.mkdir()
@@ -194,28 +199,128 @@ class FleetTest(CommandTest):
         self.assertEqual(ran.returncode, 2)
         self.assertNotIn("secret", ran.stderr)
 
-    def test_a_server_that_crashes_costs_no_frame(self):
-        self.server.sql("postgres", "CREATE DATABASE outage")
-        address = self.server.address("outage")
+    def new_town(self, name):
+        """The address of a map with the first session."""
+        self.server.sql("postgres", f"CREATE DATABASE {name}")
+        self.addCleanup(self.server.sql, "postgres", f"DROP DATABASE {name} WITH (FORCE)")
+        address = self.server.address(name)
         self.lines("map", "create", address)
-        self.assertEqual(loopbit("run", self.shared / "first", "--map", address, "--out", self.out).returncode, 0)
-        out = self.scratch / "second"
-        with subprocess.Popen([LOOPBIT, "run", self.shared / "second", "--map", address, "--out", out,
+        self.assertEqual(loopbit("run", self.shared / "first", "--map", address, "--out", self.out,
+                                 "--no-report").returncode, 0)
+        return address
+
+    @contextlib.contextmanager
+    def second_run(self, address, out):
+        """The second session, stopped when the server has some of it."""
+        with subprocess.Popen([LOOPBIT, "run", self.long, "--map", address, "--out", out,
                                "--no-report", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                               text=True) as run:
-            run.stdout.readline()    # the first loop
+            name = address.rsplit("/", 1)[1]
+            while self.server.sql(name, "SELECT count(*) FROM loopbit.session") != "2\n":
+                self.assertIsNone(run.poll())
             run.send_signal(signal.SIGSTOP)
+            yield run
+
+    def assert_all_is_saved(self, name, out):
+        """The map `name` has all that the long run in `out` found, once."""
+        rows = decisions(out)
+        self.assertIn(f"2 sessions, {HALF + len(rows)} places", self.lines("map", "check", self.server.address(name))[-1])
+        found = [(row["frame"], row["match"]) for row in rows if row["status"] == "loop"]
+        with (out / "late_loops.csv").open(newline="") as file:
+            for row in csv.DictReader(file):
+                change = found.append if row["kind"] == "late" else found.remove
+                change((row["frame"], row["match"]))
+        loops = self.server.sql(name, "SELECT frame, CASE match_session WHEN 2 THEN '' ELSE match_session || ':' END"
+                                " || match_frame FROM loopbit.loop WHERE session = 2")
+        self.assertEqual(sorted(tuple(line.split("|")) for line in loops.splitlines()), sorted(found))
+
+    def test_a_server_that_crashes_costs_no_frame(self):
+        address = self.new_town("outage")
+        out = self.scratch / "second"
+        with self.second_run(address, out) as run:
             self.server.kill()
             run.send_signal(signal.SIGCONT)
-            time.sleep(1)
+            frames = len(decisions(out))
+            while len(decisions(out)) < frames + 5:    # it goes on
+                self.assertIsNone(run.poll())
+            run.send_signal(signal.SIGSTOP)
             self.server.start()
+            run.send_signal(signal.SIGCONT)
             _, stderr = run.communicate()
         self.assertEqual(run.returncode, 0, stderr)
         self.assertRegex(stderr, r"was lost and reached again \d times; all frames are saved")
-        self.assertGreater(json.loads((out / "run.json").read_text())["map"]["reconnections"], 0)
+        record = json.loads((out / "run.json").read_text())
+        self.assertGreater(record["map"]["reconnections"], 0)
+        self.assertNotIn("queue", record["map"])
+        self.assertEqual(record["counts"]["frames"], LAPS * (FRAMES - HALF))
+        self.assertEqual(list(out.glob("queue*")), [])
+        self.assert_all_is_saved(address.rsplit("/", 1)[1], out)
+
+    def test_a_server_that_stays_away_is_brought_up_to_date_later(self):
+        address = self.new_town("away")
+        out = self.scratch / "second"
+        with self.second_run(address, out) as run:
+            self.server.kill()
+            run.send_signal(signal.SIGCONT)
+            _, stderr = run.communicate()
+        self.server.start()
+        self.assertEqual(run.returncode, 0, stderr)
+        shown = self.server.address("away", password=None)
+        queue = out / "queue.db"
+        self.assertIn(f"'loopbit map merge {shown} {queue}' brings them there", stderr)
+        record = json.loads((out / "run.json").read_text())
+        self.assertEqual(record["map"]["queue"], str(queue))
+        self.assertGreater(record["map"]["queued_frames"], 0)
+        self.assertIn("whole", self.lines("map", "check", queue)[-1])
+        self.assertRegex(self.lines("map", "merge", address, queue)[0], "the rest of 1 sessions")
+        self.assert_all_is_saved(address.rsplit("/", 1)[1], out)
+        exported = self.lines("map", "export", address)
+        self.assertIn(": 0 sessions, 0 places, 0 loops", self.lines("map", "merge", address, queue)[0])
+        self.assertEqual(self.lines("map", "export", address), exported)
+
+    def test_a_commit_whose_answer_is_lost_is_not_repeated(self):
+        self.new_town("forgetful")
+        out = self.scratch / "second"
+        with self.server.forgetful("forgetful", 2) as address:
+            ran = loopbit("run", self.shared / "second", "--map", address, "--out", out, "--no-report")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertIn("all frames are saved", ran.stderr)
         self.assertEqual(decisions(out), decisions(self.fleet / "town_session_2"))
         for command in ("check", "export"):
-            self.assertEqual(self.lines("map", command, address), self.lines("map", command, self.file))
+            self.assertEqual(self.lines("map", command, self.server.address("forgetful")),
+                             self.lines("map", command, self.file))
+
+    def test_ctrl_c_does_not_wait_for_a_server(self):
+        address = self.new_town("frozen")
+        out = self.scratch / "second"
+        with self.second_run(address, out) as run, self.server.frozen():
+            run.send_signal(signal.SIGCONT)
+            run.send_signal(signal.SIGINT)
+            begin = time.monotonic()
+            _, stderr = run.communicate()
+            self.assertLess(time.monotonic() - begin, 8)
+        self.assertEqual(run.returncode, 130, stderr)
+        self.assertIn("brings them there", stderr)
+        frames = len(decisions(out))
+        self.lines("map", "merge", address, out / "queue.db")
+        self.assertEqual(self.server.sql("frozen", "SELECT frames FROM loopbit.session WHERE session = 2"),
+                         f"{frames}\n")
+
+    def test_a_full_server_is_brought_up_to_date_later(self):
+        address = self.new_town("filled")
+        out = self.scratch / "second"
+        with self.second_run(address, out) as run:
+            self.server.sql("filled", "CREATE FUNCTION public.fail() RETURNS trigger LANGUAGE plpgsql AS "
+                            "$$BEGIN RAISE 'disk full' USING ERRCODE = 'disk_full'; END$$", "CREATE TRIGGER fail "
+                            "BEFORE INSERT ON loopbit.features EXECUTE FUNCTION public.fail()")
+            run.send_signal(signal.SIGCONT)
+            _, stderr = run.communicate()
+        self.assertEqual(run.returncode, 0, stderr)
+        self.assertIn("free space or memory on the server", stderr)
+        self.assertNotIn("unverified", json.loads((out / "run.json").read_text())["map"])
+        self.server.sql("filled", "DROP TRIGGER fail ON loopbit.features")
+        self.assertRegex(self.lines("map", "merge", address, out / "queue.db")[0], "the rest of 1 sessions")
+        self.assert_all_is_saved("filled", out)
 
     @unittest.skipUnless(SEARCH, "the extension was not built")
     def test_the_index_of_contents_survives_a_crash(self):

@@ -118,6 +118,71 @@ TEST_F(FleetMap, PlacesHaveTheEpochOfTheirCommit) {
             "1:2.0 2:1.0 3:2.1 4:1.1 5:2.2 6:1.2");
 }
 
+TEST_F(FleetMap, ASessionIsNotLinkedOnceAnEarlierOneGrows) {
+  // After a crash of the server, nothing shows that `one` is being written.
+  const auto forget = [&] {
+    sql("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = "
+        "'loopbit'");
+  };
+  MapWriter one(address, fast_options(), "one");
+  add_frame(one, 0);
+  one.flush();
+  forget();
+  MapWriter two(address, fast_options(), "two");
+  add_frame(two, 0);
+  two.flush();
+  EXPECT_EQ(sql("SELECT string_agg(session::text, ' ') FROM loopbit.linked"), "1 2");
+  forget();
+  MapWriter three(address, fast_options(), "three");
+  add_frame(one, 1);
+  one.flush();
+  EXPECT_EQ(sql("SELECT string_agg(session::text, ' ') FROM loopbit.linked"), "1");
+  add_frame(three, 0);
+  three.flush();
+  EXPECT_EQ(sql("SELECT string_agg(session::text, ' ') FROM loopbit.linked"), "1");
+  EXPECT_GT(one.reconnections(), 0);
+}
+
+TEST_F(FleetMap, WhatTheServerDoesNotTakeIsMergedLater) {
+  add_session(address, 5);
+  sql("CREATE OR REPLACE FUNCTION public.refuse() RETURNS trigger LANGUAGE plpgsql AS $$BEGIN "
+      "RAISE "
+      "'full' USING ERRCODE = 'disk_full'; END$$");
+  MapWriter map(address, fast_options(), "second", encode_image);
+  map.set_queue(path("queue.db"));
+  map.for_each_earlier_place([](const SessionFrame&, const BinaryContent&) {});
+  for (int frame = 0; frame < 3; ++frame) add_frame(map, frame, SessionFrame{1, frame});
+  map.flush();
+  sql("CREATE TRIGGER refuse BEFORE INSERT ON loopbit.place EXECUTE FUNCTION public.refuse()");
+  for (int frame = 3; frame < 7; ++frame) add_frame(map, frame, SessionFrame{1, 4});
+  map.reject({0, 1}, {1, 1});
+  map.reject({0, 6}, {1, 4});
+  expect_error(ErrorKind::output, {"full", "free space"}, [&] { map.flush(); });
+  EXPECT_TRUE(same_features(*map.features(5 + 4), few_features(4)));
+  map.finish();
+  EXPECT_EQ(map.saved_frames(), 3);
+  ASSERT_EQ(map.queue(), path("queue.db"));
+  expect_error(ErrorKind::output, {"full"}, [&] { merge_map(address, map.queue()); });
+  sql("DROP TRIGGER refuse ON loopbit.place");
+  const MergeCounts counts = merge_map(address, map.queue());
+  EXPECT_EQ(counts.continued, 1);
+  EXPECT_EQ(counts.sessions, 0);
+  EXPECT_EQ(counts.places, 4);
+  EXPECT_EQ(counts.loops, 3);
+  for (int again = 0; again < 2; ++again) {
+    MapReader read(address);
+    EXPECT_EQ(read.sessions()[1].frames, 7);
+    EXPECT_EQ(places_of(read).size(), 12U);
+    expect_only_true_places(read);
+    EXPECT_EQ(read.images().number, 7);
+    ASSERT_EQ(read.loops().size(), 5U);
+    EXPECT_EQ(read.loops()[4].query, (SessionFrame{2, 5}));
+    EXPECT_EQ(read.rejected_loops().size(), 2U);
+    EXPECT_EQ(read.odometry().size(), 12U);
+    EXPECT_EQ(merge_map(address, map.queue()).places, 0);
+  }
+}
+
 TEST_F(FleetMap, RemovesAndRejects) {
   add_session(address, 5, "first", SessionFrame{1, 0});
   MapWriter map(address, fast_options(), "second");

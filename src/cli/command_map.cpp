@@ -143,6 +143,7 @@ void merge_command(const std::string& into, const std::vector<std::string>& othe
     const MergeCounts counts = merge_map(into, other);
     fmt::print("merged     {}: {} sessions, {} places, {} loops", printable(without_secrets(other)),
                counts.sessions, counts.places, counts.loops);
+    if (counts.continued > 0) fmt::print("; the rest of {} sessions", counts.continued);
     if (counts.known > 0) fmt::print("; {} sessions were already there", counts.known);
     fmt::print("\n");
   }
@@ -280,7 +281,9 @@ void add_writers(CLI::App& map, const Flags& flags, int& exit_code) {
 
   CLI::App* merge = add_command(map, flags, "merge", "Add the sessions of other maps to a map");
   merge
-      ->add_option("OTHER", flags->others, "Maps to add; sessions that MAP already has are skipped")
+      ->add_option("OTHER", flags->others,
+                   "Maps to add, such as the queue.db of a run; of sessions that MAP already has, "
+                   "only what it lacks")
       ->required();
   merge->callback([flags] { merge_command(flags->map, flags->others); });
 

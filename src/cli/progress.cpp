@@ -52,7 +52,10 @@ void Progress::advance(bool is_loop) {
 }
 
 void Progress::report(const std::string& sentence) {
-  if (++reports_ > kMaxReports) return;
+  if (++reports_ <= kMaxReports) note(sentence);
+}
+
+void Progress::note(const std::string& sentence) {
   clear_line();
   tell(fmt::format("loopbit: {}\n", sentence));
 }

@@ -32,6 +32,9 @@ class Progress {
   /// Prints a sentence about a bad frame. After the first few, they are only counted.
   void report(const std::string& sentence);
 
+  /// Says something else.
+  void note(const std::string& sentence);
+
  private:
   using Clock = std::chrono::steady_clock;
 

@@ -86,8 +86,30 @@ RunOutcome run_with_progress(RunInput& input, const SessionFlags& flags, LivePag
       .on_rejected =
           [&](const std::vector<LateLoop>& loops) {
             if (flags.json) lines.withdraw(loops);
-          }};
+          },
+      .on_notice = [&](const std::string& sentence) { progress.note(sentence); }};
   return record_run(input, flags.run, live ? live->beside(listener) : listener, stop);
+}
+
+/// Whether the map's server was always there, and has everything.
+void tell_of_server(const RunRecord& record) {
+  if (record.map_unverified > 0) {
+    tell(
+        fmt::format("loopbit: The server did not give the features of {} candidates in time; they "
+                    "were left out.\n",
+                    record.map_unverified));
+  }
+  if (!record.map_queue.empty()) {
+    tell(fmt::format(
+        "loopbit: The server of '{0}' lacks {1} frames of session {2}, which are in "
+        "'{3}'; 'loopbit map merge {0} {3}' brings them there.\n",
+        record.map_path, record.map_queued_frames, record.map_session, record.map_queue));
+  } else if (record.map_reconnections > 0) {
+    tell(
+        fmt::format("loopbit: The server of '{}' was lost and reached again {} times; all frames "
+                    "are saved.\n",
+                    record.map_path, record.map_reconnections));
+  }
 }
 
 /// Leaves out a camera that was found and is not the one of `frames`, and says so.
@@ -231,12 +253,7 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   if (!outcome.record.early_end.empty()) {
     tell(fmt::format("loopbit: {}\n", outcome.record.early_end));
   }
-  if (const int times = outcome.record.map_reconnections; times > 0) {
-    tell(
-        fmt::format("loopbit: The server of '{}' was lost and reached again {} times; all frames "
-                    "are saved.\n",
-                    outcome.record.map_path, times));
-  }
+  tell_of_server(outcome.record);
   warn_of_damage(outcome.record.map_path, outcome.map_damage);
   const std::string report = request.evidence ? report_in(outcome.folder) : "";
   if (!report.empty()) write_report(report, {report_run(outcome.folder)}, flags.report);

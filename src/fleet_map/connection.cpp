@@ -7,9 +7,12 @@
 #include <bit>
 #include <cstdlib>
 #include <cstring>
+#include <future>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
+#include <poll.h>
 
 #include "loopbit/error.hpp"
 
@@ -87,6 +90,24 @@ PGconn* connect(const Address& address) {
   return PQconnectdbParams(names.data(), values.data(), kExpandAddress);
 }
 
+/// How soon an interrupt is noticed.
+constexpr std::chrono::milliseconds kSlice{20};
+
+/// The same, but null as soon as `is_interrupted`. Only PQconnectdbParams() tries all hosts of an
+/// address in time, and it cannot be interrupted; so it may go on, on a thread of its own.
+PGconn* connect(const Address& address, const std::atomic<bool>& is_interrupted) {
+  using Handle = std::unique_ptr<PGconn, decltype(&PQfinish)>;
+  std::promise<Handle> promise;
+  std::future<Handle> connected = promise.get_future();
+  std::thread([address, promise = std::move(promise)]() mutable {
+    promise.set_value(Handle(connect(address), PQfinish));
+  }).detach();
+  while (connected.wait_for(kSlice) != std::future_status::ready) {
+    if (is_interrupted) return nullptr;
+  }
+  return connected.get().release();
+}
+
 }  // namespace
 
 Parameter parameter(std::int64_t value) { return big_endian(static_cast<std::uint64_t>(value)); }
@@ -107,13 +128,17 @@ std::int64_t integer_in(const PGresult& result, int row, int column) {
 }
 
 Connection::Connection(const Address& address, MapDatabase::Access access)
-    : address_(address), shown_(address.shown()), access_(access), handle_(connect(address)) {
+    : address_(address),
+      shown_(address.shown()),
+      access_(access),
+      handle_(connect(address, is_interrupted_)) {
   begin();
 }
 
 void Connection::reconnect() {
   prepared_.clear();
-  handle_.reset(connect(address_));
+  handle_.reset(connect(address_, is_interrupted_));
+  is_given_up_ = false;
   begin();
 }
 
@@ -125,20 +150,66 @@ void Connection::begin() {
   }
   PQsetNoticeProcessor(
       handle_.get(), [](void*, const char*) {}, nullptr);
+  PQsetnonblocking(handle_.get(), 1);
   execute("SET search_path = loopbit, pg_temp");
-  if (access_ == MapDatabase::Access::read) execute("SET default_transaction_read_only = on");
+  if (access_ == MapDatabase::Access::read) {
+    execute("SET default_transaction_read_only = on");
+  } else {
+    // Others wait for a transaction whose robot was cut off.
+    execute("SET idle_in_transaction_session_timeout = '10s'");
+  }
 }
 
 Result Connection::execute(const std::string& sql) const {
-  return checked(PQexec(handle_.get(), sql.c_str()));
+  check_not_given_up();
+  PQsendQuery(handle_.get(), sql.c_str());
+  return checked(answer());
+}
+
+void Connection::check_not_given_up() const {
+  if (is_given_up_) fail("it did not answer in time", remedy_for("", shown_));
+}
+
+void Connection::wait_for_server(int events) const {
+  const auto begin = std::chrono::steady_clock::now();
+  pollfd server{.fd = PQsocket(handle_.get()), .events = static_cast<short>(events), .revents = 0};
+  constexpr auto kSlice_ms = static_cast<int>(kSlice.count());
+  while (poll(&server, 1, kSlice_ms) == 0) {
+    const bool is_late = limit_.count() > 0 && std::chrono::steady_clock::now() - begin > limit_;
+    if (!is_late && !is_interrupted_) continue;
+    is_given_up_ = true;
+    fail(is_late ? fmt::format("no answer within {} ms", limit_.count()) : "interrupted",
+         remedy_for("", shown_));
+  }
+}
+
+Result Connection::answer() const {
+  PGconn* const server = handle_.get();
+  int unsent = PQflush(server);
+  for (; unsent > 0; unsent = PQflush(server)) {
+    wait_for_server(POLLIN | POLLOUT);
+    if (PQconsumeInput(server) == 0) break;
+  }
+  Result kept;
+  while (true) {
+    while (PQisBusy(server) != 0) {
+      wait_for_server(POLLIN);
+      if (PQconsumeInput(server) == 0) break;
+    }
+    Result next(PQgetResult(server));
+    if (!next) return kept;
+    if (!kept || PQresultStatus(kept.get()) != PGRES_FATAL_ERROR) kept = std::move(next);
+  }
 }
 
 Result Connection::run(const std::string& sql, const std::vector<Parameter>& parameters) const {
+  check_not_given_up();
   auto found = prepared_.find(sql);
   const auto size = static_cast<int>(parameters.size());
   if (found == prepared_.end()) {
     const std::string name = fmt::format("s{}", prepared_.size());
-    checked(PQprepare(handle_.get(), name.c_str(), sql.c_str(), size, nullptr));
+    PQsendPrepare(handle_.get(), name.c_str(), sql.c_str(), size, nullptr);
+    checked(answer());
     found = prepared_.emplace(sql, name).first;
   }
   std::vector<const char*> values;
@@ -148,8 +219,9 @@ Result Connection::run(const std::string& sql, const std::vector<Parameter>& par
     sizes.push_back(value ? static_cast<int>(value->size()) : 0);
   }
   const std::vector<int> formats(parameters.size(), kBinary);
-  return checked(PQexecPrepared(handle_.get(), found->second.c_str(), size, values.data(),
-                                sizes.data(), formats.data(), kBinary));
+  PQsendQueryPrepared(handle_.get(), found->second.c_str(), size, values.data(), sizes.data(),
+                      formats.data(), kBinary);
+  return checked(answer());
 }
 
 std::int64_t Connection::integer(const std::string& sql,
@@ -162,14 +234,13 @@ void Connection::refuse(const std::string& why) const {
   throw Error(ErrorKind::input, fmt::format("'{}' {}.", shown_, why));
 }
 
-Result Connection::checked(PGresult* answer) const {
-  Result result(answer);
-  const ExecStatusType status = PQresultStatus(answer);
+Result Connection::checked(Result answer) const {
+  const ExecStatusType status = PQresultStatus(answer.get());
   if (status == PGRES_COMMAND_OK || status == PGRES_TUPLES_OK || status == PGRES_EMPTY_QUERY) {
-    return result;
+    return answer;
   }
-  const char* state = PQresultErrorField(answer, PG_DIAG_SQLSTATE);
-  const char* message = PQresultErrorField(answer, PG_DIAG_MESSAGE_PRIMARY);
+  const char* state = PQresultErrorField(answer.get(), PG_DIAG_SQLSTATE);
+  const char* message = PQresultErrorField(answer.get(), PG_DIAG_MESSAGE_PRIMARY);
   fail(one_line(message ? message : PQerrorMessage(handle_.get())),
        remedy_for(state ? state : "", shown_));
 }

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -48,10 +50,16 @@ class Connection {
   [[nodiscard]] std::int64_t integer(const std::string& sql,
                                      const std::vector<Parameter>& parameters = {}) const;
 
-  [[nodiscard]] bool is_lost() const { return PQstatus(handle_.get()) != CONNECTION_OK; }
+  [[nodiscard]] bool is_lost() const {
+    return is_given_up_ || PQstatus(handle_.get()) != CONNECTION_OK;
+  }
 
   /// Connects again. Statements remain valid.
   void reconnect();
+
+  /// See MapDatabase.
+  void set_time_limit(std::chrono::milliseconds limit) { limit_ = limit; }
+  void interrupt() { is_interrupted_ = true; }
 
   /// The address without passwords.
   [[nodiscard]] const std::string& shown() const { return shown_; }
@@ -64,7 +72,12 @@ class Connection {
     void operator()(PGconn* connection) const { PQfinish(connection); }
   };
 
-  Result checked(PGresult* answer) const;
+  /// The answer to what was sent; of several, the first that is an error, or the last.
+  Result answer() const;
+  void check_not_given_up() const;
+  /// Waits until the server may be read from, or written to. Throws Error.
+  void wait_for_server(int events) const;
+  Result checked(Result answer) const;
   [[noreturn]] void fail(const std::string& reason, const std::string& remedy) const;
 
   void begin();
@@ -72,8 +85,11 @@ class Connection {
   Address address_;
   std::string shown_;
   MapDatabase::Access access_;
+  std::atomic<bool> is_interrupted_ = false;
   std::unique_ptr<PGconn, Finish> handle_;
   mutable std::map<std::string, std::string> prepared_;  ///< names by statement
+  std::chrono::milliseconds limit_{0};                   ///< of an answer; 0 = none
+  mutable bool is_given_up_ = false;                     ///< an answer did not come in time
 };
 
 /// A statement with parameters ?1, ?2 and so on. All of its rows are in memory.

@@ -29,6 +29,10 @@ constexpr const char* kCountLocked =
     "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND objsubid = 2 AND classid = "
     "1819242352 AND objid::bigint BETWEEN 1 AND $1 AND database = (SELECT oid FROM pg_database "
     "WHERE datname = current_database())";
+constexpr const char* kEndHolders =
+    "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE locktype = 'advisory' AND objsubid = 2 "
+    "AND classid = 1819242352 AND objid::bigint = $1 AND pid <> pg_backend_pid() AND database = "
+    "(SELECT oid FROM pg_database WHERE datname = current_database())";
 constexpr std::int64_t kMaxSession = 2'147'483'647;
 
 }  // namespace
@@ -134,7 +138,14 @@ bool FleetDatabase::is_being_written() const {
 void FleetDatabase::reconnect() {
   connection_.reconnect();
   in_transaction_ = false;
-  if (session_ > 0) connection_.run(kLockSession, {parameter(session_)});
+  if (session_ == 0) return;
+  // The server may not know yet that the connection before is gone.
+  connection_.run(kEndHolders, {parameter(session_)});
+  connection_.run(kLockSession, {parameter(session_)});
+}
+
+void FleetDatabase::hold_back_commits() const {
+  connection_.execute("SELECT pg_advisory_xact_lock(1819242352, 0)");
 }
 
 std::int64_t FleetDatabase::bytes() const {

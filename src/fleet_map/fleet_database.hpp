@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -37,6 +38,11 @@ class FleetDatabase final : public MapDatabase {
   [[nodiscard]] std::vector<std::string> structure_faults() const override { return {}; }
   [[nodiscard]] bool is_lost() const override { return connection_.is_lost(); }
   void reconnect() override;
+  void set_time_limit(std::chrono::milliseconds limit) override {
+    connection_.set_time_limit(limit);
+  }
+  void interrupt() override { connection_.interrupt(); }
+  void hold_back_commits() const override;
   void close() override {}
 
  private:

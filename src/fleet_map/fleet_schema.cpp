@@ -93,10 +93,12 @@ CREATE TABLE linked (session bigint PRIMARY KEY REFERENCES session, checksum big
 ALTER TABLE features ALTER COLUMN features SET STORAGE EXTERNAL;
 ALTER TABLE image ALTER COLUMN image SET STORAGE EXTERNAL;
 CREATE INDEX ON place (session);
+CREATE INDEX ON place (batch);
 CREATE INDEX ON loop (session, frame);
 CREATE INDEX ON rejected (session, frame))";
 
-/// The lock makes epochs follow each other as commits do.
+/// The lock makes epochs follow each other as commits do. Sessions that began after one that grows
+/// were not compared with all of it.
 constexpr const char* kFunctions = R"(
 CREATE FUNCTION end_batch() RETURNS bigint LANGUAGE plpgsql SECURITY DEFINER
 SET search_path = loopbit, pg_temp AS $$
@@ -106,6 +108,9 @@ BEGIN
   PERFORM pg_advisory_xact_lock(1819242352, 0);
   INSERT INTO batch SELECT currval('batch_number'), coalesce(max(epoch), 0) + 1 FROM batch
     RETURNING epoch INTO now_epoch;
+  DELETE FROM linked WHERE
+    session > (SELECT min(place.session) FROM place WHERE batch = currval('batch_number')) AND
+    session NOT IN (SELECT place.session FROM place WHERE batch = currval('batch_number'));
   RETURN now_epoch;
 END
 $$;

@@ -3,11 +3,8 @@
 #include "batch_writer.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
-
-#include "lost_server.hpp"
 
 namespace loopbit {
 namespace {
@@ -19,7 +16,6 @@ std::optional<double> time_of(const Detection& detection) {
 }
 
 constexpr std::size_t kFramesPerBatch = 32;
-constexpr std::chrono::seconds kMaxDelay{1};
 /// 12 MB of features, and 50 MB of images if these are saved.
 constexpr std::size_t kMaxPendingFrames = 256;
 
@@ -27,12 +23,13 @@ constexpr std::size_t kMaxPendingFrames = 256;
 
 BatchWriter::BatchWriter(std::unique_ptr<MapDatabase> database, MapSession session,
                          std::int64_t first_place, const OdometryDrift& drift,
-                         EncodeImage encode_image)
+                         EncodeImage encode_image, BatchPace pace)
     : database_(std::move(database)),
       session_(std::move(session)),
       first_place_(first_place),
       drift_(drift),
       encode_image_(std::move(encode_image)),
+      pace_(std::move(pace)),
       thread_([this] { commit_batches(); }) {}
 
 BatchWriter::~BatchWriter() {
@@ -90,9 +87,11 @@ std::int64_t BatchWriter::saved_frames() const {
   return saved_frames_;
 }
 
-int BatchWriter::reconnections() const {
+void BatchWriter::add_other(MapSession session) {
+  session.frames = 0;
+  session.linked = false;
   const std::lock_guard lock(mutex_);
-  return reconnections_;
+  others_[session.session] = std::move(session);
 }
 
 void BatchWriter::close() {
@@ -105,7 +104,7 @@ void BatchWriter::commit_batches() {
   std::unique_lock lock(mutex_);
   while (!stop_) {
     added_.wait(lock, [&] { return stop_ || !pending_.empty() || !changes_.empty(); });
-    added_.wait_for(lock, kMaxDelay,
+    added_.wait_for(lock, pace_.max_delay,
                     [&] { return stop_ || in_a_hurry_ || pending_.size() >= kFramesPerBatch; });
     if (stop_) return;
     std::vector<AddedFrame> batch;
@@ -115,7 +114,7 @@ void BatchWriter::commit_batches() {
       batch.assign(pending_.begin(), pending_.end());
       changes = changes_;
       lock.unlock();
-      commit_once(batch, changes);
+      commit(batch, changes);
     } catch (...) {
       error = std::current_exception();
     }
@@ -129,36 +128,10 @@ void BatchWriter::commit_batches() {
                      changes_.begin() + static_cast<std::ptrdiff_t>(changes.size()));
       saved_frames_ += static_cast<std::int64_t>(batch.size());
     }
+    if (!error_ && pace_.on_commit) pace_.on_commit();
     committed_.notify_all();
     if (error_) return;
   }
-}
-
-/// Also if the server is lost meanwhile.
-void BatchWriter::commit_once(const std::vector<AddedFrame>& batch, const Changes& changes) {
-  const auto pause = [this](std::chrono::milliseconds duration) {
-    std::unique_lock lock(mutex_);
-    return !added_.wait_for(lock, duration, [&] { return stop_; });
-  };
-  const std::int64_t frames =
-      batch.empty() ? session_.frames : batch.back().detection.frame + std::int64_t{1};
-  bool is_first_try = true;
-  const int lost = despite_lost_server(*database_, pause, [&] {
-    // Changes may be made twice.
-    const bool is_done =
-        !std::exchange(is_first_try, false) && !batch.empty() && is_committed(frames);
-    commit(is_done ? std::vector<AddedFrame>{} : batch, changes);
-  });
-  session_.frames = frames;
-  const std::lock_guard lock(mutex_);
-  reconnections_ += lost;
-}
-
-/// Whether the session has so many frames in the map.
-bool BatchWriter::is_committed(std::int64_t frames) const {
-  const auto row = database_->prepare("SELECT frames FROM session WHERE session = ?1");
-  row->bind(1, std::int64_t{session_.session});
-  return row->step() && row->integer(0) >= frames;
 }
 
 void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& changes) {
@@ -173,6 +146,17 @@ void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& ch
   for (const AddedFrame& frame : batch) write(frame);
   for (const auto& change : changes) change(*database_);
   transaction->end();
+  if (!batch.empty()) session_.frames = batch.back().detection.frame + 1;
+}
+
+void BatchWriter::write(const MapLoop& loop) {
+  std::map<int, MapSession>::node_type other;
+  {
+    const std::lock_guard lock(mutex_);
+    other = others_.extract(loop.match.session);
+  }
+  if (!other.empty()) rows_->write(other.mapped());
+  rows_->write(loop);
 }
 
 void BatchWriter::write(const AddedFrame& frame) {
@@ -189,13 +173,13 @@ void BatchWriter::write(const AddedFrame& frame) {
                        .content = frame.content};
   rows_->write(place, *frame.features);
   if (!frame.image.empty()) rows_->write_image(place, encode_image_(frame.image));
-  if (detection.status == Status::loop) rows_->write(loop_of(detection, session_.session));
+  if (detection.status == Status::loop) write(loop_of(detection, session_.session));
   for (const LateLoop& late : detection.withdrawn_loops) {
     const MapLoop loop = loop_of(late, session_.session);
     reject_loop(*database_, loop.query, loop.match);
   }
   for (const LateLoop& late : detection.late_loops) {
-    rows_->write(loop_of(late, session_.session));
+    write(loop_of(late, session_.session));
   }
 }
 

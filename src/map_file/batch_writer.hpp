@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <cstdint>
 #include <deque>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -28,13 +30,19 @@ struct AddedFrame {
   cv::Mat image = {};  ///< a copy; empty if no image is saved
 };
 
+/// How soon frames are committed, and what is then called on the writer's thread.
+struct BatchPace {
+  std::chrono::milliseconds max_delay{1000};
+  std::function<void()> on_commit = {};
+};
+
 /// Commits the frames of one session in batches, on a thread of its own. The id of frame k's place
 /// is first_place + k. One thread at a time may call it.
 class BatchWriter {
  public:
   /// `drift`: of odometry without covariances. `encode_image` may be empty.
   BatchWriter(std::unique_ptr<MapDatabase> database, MapSession session, std::int64_t first_place,
-              const OdometryDrift& drift, EncodeImage encode_image);
+              const OdometryDrift& drift, EncodeImage encode_image, BatchPace pace = {});
   /// Drops uncommitted frames.
   ~BatchWriter();
   BatchWriter(const BatchWriter&) = delete;
@@ -44,6 +52,10 @@ class BatchWriter {
 
   /// Waits while too many frames are pending. Throws the Error of an earlier frame.
   void add(AddedFrame frame);
+
+  /// A session of another map. The map gets its description, without frames, with the first loop
+  /// that leads there.
+  void add_other(MapSession session);
 
   /// Makes `change` part of a commit, after all frames that were added so far.
   void change(std::function<void(const MapDatabase&)> change);
@@ -56,9 +68,6 @@ class BatchWriter {
 
   [[nodiscard]] std::int64_t saved_frames() const;
 
-  /// How often the server was lost and reached again.
-  [[nodiscard]] int reconnections() const;
-
   /// Call this once, after flush(). Releases the lock of the map and, if nobody reads it, leaves
   /// one file without a log.
   void close();
@@ -67,10 +76,9 @@ class BatchWriter {
   using Changes = std::vector<std::function<void(const MapDatabase&)>>;
 
   void commit_batches();
-  void commit_once(const std::vector<AddedFrame>& batch, const Changes& changes);
-  [[nodiscard]] bool is_committed(std::int64_t frames) const;
   void commit(const std::vector<AddedFrame>& batch, const Changes& changes);
   void write(const AddedFrame& frame);
+  void write(const MapLoop& loop);
   /// Gives it the covariance since the pose before, if it has none.
   void complete(OdometryPose& pose);
 
@@ -81,14 +89,15 @@ class BatchWriter {
   OdometryDrift drift_;
   std::optional<cv::Matx44d> last_pose_;  ///< by odometry, of the last frame that was added
   EncodeImage encode_image_;
+  BatchPace pace_;
 
   mutable std::mutex mutex_;  ///< guards all below
   std::condition_variable added_;
   std::condition_variable committed_;
   std::deque<AddedFrame> pending_;
   Changes changes_;
+  std::map<int, MapSession> others_;  ///< by number; those that the map lacks
   std::int64_t saved_frames_ = 0;
-  int reconnections_ = 0;
   std::exception_ptr error_;
   bool in_a_hurry_ = false;
   bool stop_ = false;

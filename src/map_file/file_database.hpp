@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -37,6 +38,9 @@ class FileDatabase final : public MapDatabase {
   [[nodiscard]] std::vector<std::string> structure_faults() const override;
   [[nodiscard]] bool is_lost() const override { return false; }
   void reconnect() override {}
+  void set_time_limit(std::chrono::milliseconds /*limit*/) override {}
+  void interrupt() override {}
+  void hold_back_commits() const override {}  // there is one writer
   void close() override;
 
  private:

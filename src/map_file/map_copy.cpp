@@ -47,7 +47,7 @@ class MapCopy {
  public:
   /// `numbers`: the number in `to` of each session that is copied.
   MapCopy(const MapDatabase& to, std::map<int, int> numbers)
-      : rows_(to), numbers_(std::move(numbers)) {}
+      : to_(to), rows_(to), numbers_(std::move(numbers)) {}
 
   void copy_session(MapSession session) {
     session.session = numbers_.at(session.session);
@@ -76,6 +76,11 @@ class MapCopy {
     if (renumber(loop.query) && renumber(loop.match)) rows_.write_rejected(loop);
   }
 
+  /// Rejects it in `to`, which may have it as a loop.
+  void reject(MapLoop loop) {
+    if (renumber(loop.query) && renumber(loop.match)) reject_loop(to_, loop);
+  }
+
   void copy_odometry(MapOdometry odometry) {
     if (renumber(odometry.at)) rows_.write(odometry);
   }
@@ -92,6 +97,7 @@ class MapCopy {
     return true;
   }
 
+  const MapDatabase& to_;
   RowWriter rows_;
   std::map<int, int> numbers_;
 };
@@ -139,29 +145,55 @@ MapCheck copy_whole(MapReader& from, const CopyPlan& plan, const MapDatabase& to
 
 /// Which sessions are added, and under which numbers.
 struct MergePlan {
-  std::map<int, int> numbers;     ///< from numbers in the other map to numbers in this one
-  std::vector<MapSession> added;  ///< those that this one lacks
-  std::int64_t known = 0;         ///< the number of other sessions
+  std::map<int, int> numbers;         ///< from numbers in the other map to numbers in this one
+  std::vector<MapSession> added;      ///< those that this one lacks
+  std::vector<MapSession> continued;  ///< those of which it has fewer frames
+  std::map<int, KnownRows> had;       ///< by number in the other map: what this one has
+  std::set<int> whole;                ///< sessions of `had` that are not continued
+
+  /// Of a loop of `query` or its pose, with numbers of the other map; none if its match is in
+  /// neither.
+  [[nodiscard]] std::optional<KnownRows::Pair> pair(const SessionFrame& query,
+                                                    SessionFrame match) const {
+    const auto number = numbers.find(match.session);
+    if (number == numbers.end()) return std::nullopt;
+    match.session = number->second;
+    return KnownRows::pair(query, match);
+  }
+
+  /// Of the other map's session, for what it adds to this one.
+  [[nodiscard]] const KnownRows& had_of(int session) const {
+    static const KnownRows nothing;
+    const auto found = had.find(session);
+    return found == had.end() ? nothing : found->second;
+  }
 };
 
 /// Throws Error (kind option) if settings differ.
 MergePlan plan_of(const MapDatabase& to, const MapReader& source) {
   Damage damage;
-  std::map<std::string, int> known;
+  std::map<std::string, MapSession> known;
   std::string options;
   for (const MapSession& session : read_sessions(to, damage)) {
-    known[session.uid] = session.session;
+    known[session.uid] = session;
     options = session.options;
   }
   refuse_damaged(to.path(),
                  damage.clauses());  // a session with an unknown uid could be added twice
+  std::map<int, KnownRows> rows = known_rows(to);
   MergePlan plan;
   for (const MapSession& session : source.sessions()) {
     if (options.empty()) options = session.options;
     check_same_shape(to.path(), options, options_of_shape(source.path(), session.options));
     if (const auto found = known.find(session.uid); found != known.end()) {
-      plan.numbers[session.session] = found->second;
-      ++plan.known;
+      plan.numbers[session.session] = found->second.session;
+      plan.had[session.session] = rows[found->second.session];
+      if (session.frames > found->second.frames) {
+        plan.continued.push_back(session);
+        plan.continued.back().linked = false;  // or it says so already
+      } else {
+        plan.whole.insert(session.session);
+      }
     } else {
       plan.added.push_back(session);
       // Those of `into` that come before it now are new to it.
@@ -184,20 +216,42 @@ void refuse_unfinished(const std::string& from) {
                                             database->path()));
 }
 
-/// Adds the sessions of `source` that `into` lacks, in one transaction.
+/// Copies loops, what was rejected, and poses that are not there. Returns the number of loops.
+std::int64_t copy_loops(const MergePlan& plan, MapReader& source, MapCopy& copy) {
+  for (const MapLoop& loop : source.rejected_loops()) {
+    const auto pair = plan.pair(loop.query, loop.match);
+    if (pair && !plan.had_of(loop.query.session).rejected.contains(*pair)) copy.reject(loop);
+  }
+  std::int64_t number = 0;
+  for (const MapLoop& loop : source.loops()) {
+    if (plan.whole.contains(loop.query.session)) continue;
+    const auto pair = plan.pair(loop.query, loop.match);
+    const KnownRows& had = plan.had_of(loop.query.session);
+    if (!pair || had.loops.contains(*pair) || had.rejected.contains(*pair)) continue;
+    number += copy.copy_loop(loop);
+  }
+  for (const MapLoopPose& pose : source.loop_poses()) {
+    const auto pair = plan.pair(pose.query, pose.match);
+    if (pair && !plan.had_of(pose.query.session).poses.contains(*pair)) copy.copy_pose(pose);
+  }
+  return number;
+}
+
+/// Adds to `to` what it lacks of the sessions of `source`, in one transaction.
 MergeCounts merge(const MapDatabase& to, MapReader& source) {
   const MergePlan plan = plan_of(to, source);
-  std::set<int> added;
-  for (const MapSession& session : plan.added) added.insert(session.session);
-
-  MergeCounts counts{.sessions = static_cast<std::int64_t>(added.size()), .known = plan.known};
+  MergeCounts counts{.sessions = static_cast<std::int64_t>(plan.added.size()),
+                     .known = static_cast<std::int64_t>(plan.whole.size()),
+                     .continued = static_cast<std::int64_t>(plan.continued.size())};
   to.prepare_long_transaction();
   const auto transaction = to.begin();
   MapCopy copy(to, plan.numbers);
   std::int64_t id = 0;
   for (const MapSession& session : plan.added) copy.copy_session(session);
+  for (const MapSession& session : plan.continued) copy.copy_session(session);
   source.for_each_place([&](const MapPlace& place) {
-    if (!added.contains(place.at.session)) return;
+    if (!plan.numbers.contains(place.at.session)) return;  // it is damaged
+    if (place.at.frame < plan.had_of(place.at.session).frames) return;
     const auto features = source.features_of(place);
     if (!features) return;
     MapPlace copied = place;
@@ -206,17 +260,9 @@ MergeCounts merge(const MapDatabase& to, MapReader& source) {
     counts.places += copy.copy_place(copied, *features,
                                      source.image_of(place).value_or(std::vector<unsigned char>{}));
   });
-  for (const MapLoop& loop : source.loops()) {
-    if (added.contains(loop.query.session)) counts.loops += copy.copy_loop(loop);
-  }
-  for (const MapLoop& loop : source.rejected_loops()) {
-    if (added.contains(loop.query.session)) copy.copy_rejected(loop);
-  }
+  counts.loops = copy_loops(plan, source, copy);
   for (const MapOdometry& odometry : source.odometry()) {
-    if (added.contains(odometry.at.session)) copy.copy_odometry(odometry);
-  }
-  for (const MapLoopPose& pose : source.loop_poses()) {
-    if (added.contains(pose.query.session)) copy.copy_pose(pose);
+    if (odometry.at.frame >= plan.had_of(odometry.at.session).frames) copy.copy_odometry(odometry);
   }
   refuse_damaged(source.path(), source.damage());
   transaction->end();

@@ -2,13 +2,13 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/map_file.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <ctime>
+#include <filesystem>
 #include <map>
 #include <new>
 #include <random>
-#include <set>
-#include <thread>
 #include <tuple>
 #include <utility>
 
@@ -16,15 +16,17 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "loopbit/database.hpp"
 #include "loopbit/error.hpp"
+#include "loopbit/map_server.hpp"
 #include "loopbit/picture.hpp"
 #include "loopbit/version.hpp"
 
 #include "batch_writer.hpp"
 #include "file_database.hpp"
-#include "lost_server.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
+#include "session_upload.hpp"
 #include "stored_features.hpp"
 
 namespace loopbit {
@@ -43,6 +45,24 @@ Error read_only(const std::string& path) {
           fmt::format("'{}' is open to be read: use LoopDetector::query, or open it by MapWriter.",
                       path)};
 }
+
+/// Of a path that nothing has: "queue_2.db" if there is a "queue.db".
+std::string free_path(const std::string& path) {
+  const std::filesystem::path wanted(path);
+  std::error_code error;
+  std::string free = path;
+  for (int number = 2; std::filesystem::exists(free, error); ++number) {
+    free = (wanted.parent_path() /
+            fmt::format("{}_{}{}", wanted.stem().string(), number, wanted.extension().string()))
+               .string();
+  }
+  return free;
+}
+
+/// A frame waits no longer for features from a server.
+constexpr std::chrono::milliseconds kMaxWait{1000};
+/// Frames that are queued for a server should be there, and seen by other robots, within a second.
+constexpr std::chrono::milliseconds kMaxQueued{250};
 
 std::string now_utc() {
   return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
@@ -178,17 +198,36 @@ class MapWriter::Impl {
  public:
   Impl(const std::string& path, const LoopDetectorOptions& options, const std::string& name,
        EncodeImage encode_image, std::size_t cache_mb)
-      : options_(options),
-        keeps_images_(encode_image != nullptr),
-        writer_(begin_session(path, name, std::move(encode_image), cache_mb)) {}
+      : options_(options), encode_image_(std::move(encode_image)) {
+    begin_session(path, name, cache_mb);
+  }
 
-  void finish() {
+  void finish(const std::function<bool()>& is_stopped = {}) {
     if (!stored_) return;
-    writer_->flush();
+    if (writer_) writer_->flush();
+    const bool is_whole = !upload_ || upload_->catch_up(is_stopped);
+    if (upload_) end_upload();
     stored_.reset();
+    own_features_.reset();
+    own_file_.reset();
     snapshot_.reset();
     database_.reset();
-    writer_->close();
+    server_.reset();
+    if (writer_) writer_->close();
+    if (!is_on_server_ || !is_whole) return;
+    if (writer_) remove_database(queue_);
+    queue_.clear();
+  }
+
+  void set_queue(const std::string& path) {
+    if (is_on_server_ && !writer_) queue_ = free_path(path);
+  }
+
+  void flush() {
+    if (!writer_) return;
+    writer_->flush();
+    if (!upload_ || upload_->catch_up()) return;
+    throw upload_->fault().value();
   }
 
   /// Whether this is the copy in a forked child, which has no thread.
@@ -229,14 +268,11 @@ class MapWriter::Impl {
 
   std::shared_ptr<const Features> features(PlaceId place) {
     if (auto found = stored().find(place)) return found;
-    if (auto pending = writer_->pending(place - session_begin())) return pending;
-    const auto pause = [](std::chrono::milliseconds duration) {
-      std::this_thread::sleep_for(duration);
-      return true;
-    };
-    std::shared_ptr<const Features> read;
-    despite_lost_server(*database_, pause, [&] { read = stored().get(place, damage_); });
-    return read;
+    if (writer_) {
+      if (auto pending = writer_->pending(place - session_begin())) return pending;
+    }
+    if (!is_on_server_) return stored().get(place, damage_);
+    return place < session_begin() ? fetch(place) : stored().get(place, damage_, own_features());
   }
 
   void add(const Detection& detection, const BinaryContent& content,
@@ -244,14 +280,15 @@ class MapWriter::Impl {
     StoredFeatures& places = stored();
     snapshot_.reset();  // of a detector that did not ask for earlier loops
     places.reserve_next();
-    writer_->add({.content = content,
+    waited_ = {};
+    writer().add({.content = content,
                   .detection = detection,
                   .features = features,
-                  .image = keeps_images_ ? halved_to_picture(image) : cv::Mat()});
+                  .image = encode_image_ ? halved_to_picture(image) : cv::Mat()});
     // From here on nothing may fail, since the frame is in the map.
     const bool has_row = detection.status != Status::unreadable;
     const PlaceId place = places.size();
-    places.add(has_row ? first_place_ + detection.frame : StoredFeatures::kNoRow,
+    places.add(has_row ? begun_.first_place + detection.frame : StoredFeatures::kNoRow,
                {session_, detection.frame});
     ++frames_;
     try {
@@ -264,7 +301,8 @@ class MapWriter::Impl {
   void remove(PlaceId place) {
     const std::int64_t id = stored().remove(place);
     if (id == StoredFeatures::kNoRow) return;
-    writer_->change([id](const MapDatabase& database) { remove_place(database, id); });
+    change(place >= session_begin(),
+           [id](const MapDatabase& database) { remove_place(database, id); });
   }
 
   void add_pose(MapLoopPose pose) {
@@ -273,7 +311,7 @@ class MapWriter::Impl {
     for (SessionFrame* at : {&pose.query, &pose.match}) {
       if (at->session == 0) at->session = session_;
     }
-    writer_->change([pose](const MapDatabase& database) { RowWriter(database).write(pose); });
+    writer().change([pose](const MapDatabase& database) { RowWriter(database).write(pose); });
   }
 
   void reject(SessionFrame query, SessionFrame match) {
@@ -285,43 +323,134 @@ class MapWriter::Impl {
                                                  "shows those there are.",
                                                  path_, at->session));
     }
-    writer_->change(
-        [query, match](const MapDatabase& database) { reject_loop(database, query, match); });
+    const SessionUpload::Change rejection = [query, match](const MapDatabase& database) {
+      reject_loop(database, query, match);
+    };
+    if (query.session == session_) {
+      writer().change(rejection);  // the upload copies it
+    } else {
+      change(false, rejection);
+    }
   }
 
   [[nodiscard]] int session() const { return session_; }
   [[nodiscard]] const Damage& damage() const { return damage_; }
-  [[nodiscard]] BatchWriter& writer() const { return *writer_; }
+  [[nodiscard]] const std::string& queue() const { return queue_; }
+  [[nodiscard]] std::int64_t unverified() const { return unverified_; }
+
+  [[nodiscard]] std::int64_t saved_frames() const {
+    if (is_on_server_) return upload_ ? upload_->saved_frames() : last_saved_frames_;
+    return writer_->saved_frames();
+  }
+
+  [[nodiscard]] int reconnections() const {
+    return upload_ ? upload_->reconnections() : last_reconnections_;
+  }
+
+  std::vector<std::string> take_notices() {
+    return upload_ ? upload_->take_notices() : std::exchange(last_notices_, {});
+  }
 
  private:
-  std::unique_ptr<BatchWriter> begin_session(const std::string& path, const std::string& name,
-                                             EncodeImage encode_image, std::size_t cache_mb) {
-    std::unique_ptr<MapDatabase> database = open_map(path, MapDatabase::Access::write);
-    path_ = database->path();
-    check_sessions(*database);
-    const MapDatabase::NewSession begun = database->begin_session();
+  void begin_session(const std::string& path, const std::string& name, std::size_t cache_mb) {
+    server_ = open_map(path, MapDatabase::Access::write);
+    path_ = server_->path();
+    is_on_server_ = is_map_address(path);
+    check_sessions(*server_);
+    const MapDatabase::NewSession begun = server_->begin_session();
     session_ = begun.session;
     database_ = open_map(path, MapDatabase::Access::read);
     snapshot_ = database_->snapshot();
     check_sessions(*database_);  // others may have begun some meanwhile
     stored_.emplace(*database_, cache_mb);
-    first_place_ = database->place_key({session_, 0}, 0);
-    MapSession session{.session = session_,
-                       .uid = new_uid(),
-                       .name = name,
-                       .started = now_utc(),
-                       .loopbit = kVersion,
-                       .options = to_json(options_),
-                       .linked = begun.is_linked};
-    return std::make_unique<BatchWriter>(std::move(database), std::move(session), first_place_,
-                                         options_.odometry, std::move(encode_image));
+    begun_ = {.session = {.session = session_,
+                          .uid = new_uid(),
+                          .name = name,
+                          .started = now_utc(),
+                          .loopbit = kVersion,
+                          .options = to_json(options_),
+                          .linked = begun.is_linked},
+              .first_place = server_->place_key({session_, 0}, 0)};
+    for (const auto& [number, session] : sessions_) {
+      if (number < session_) begun_.earlier_frames += session.frames;
+    }
+    if (is_on_server_) {
+      queue_ = free_path(fmt::format("{}_session_{}_queue.db", map_stem(path), session_));
+    } else {
+      writer_ = std::make_unique<BatchWriter>(std::move(server_), begun_.session,
+                                              begun_.first_place, options_.odometry, encode_image_);
+    }
+  }
+
+  /// Of a map on a server, the file that queues its rows is made by the first call.
+  BatchWriter& writer() {
+    if (writer_) return *writer_;
+    auto file = open_map(queue_, MapDatabase::Access::write);
+    upload_ = std::make_unique<SessionUpload>(std::move(server_), *database_, begun_, queue_);
+    MapSession queued = begun_.session;
+    queued.linked = false;
+    writer_ = std::make_unique<BatchWriter>(
+        std::move(file), std::move(queued), begun_.first_place, options_.odometry, encode_image_,
+        BatchPace{.max_delay = kMaxQueued,
+                  .on_commit = [this] { upload_->wake(std::exchange(changes_, {})); }});
+    for (const auto& [number, session] : sessions_) writer_->add_other(session);
+    return *writer_;
+  }
+
+  /// Makes a change of the map and, if it is of this session, of what is queued for a server.
+  void change(bool is_own, const SessionUpload::Change& change) {
+    if (!is_on_server_) return writer().change(change);
+    writer().change([this, is_own, change](const MapDatabase& queued) {
+      if (is_own) change(queued);
+      changes_.push_back(change);
+    });
+  }
+
+  /// Features from the server; empty if it does not give them in time.
+  std::shared_ptr<const Features> fetch(PlaceId place) {
+    const bool is_lost = upload_ && upload_->is_reader_lost();
+    if (is_lost || waited_ >= kMaxWait) return missing();
+    const auto begin = std::chrono::steady_clock::now();
+    database_->set_time_limit(
+        std::chrono::duration_cast<std::chrono::milliseconds>(kMaxWait - waited_));
+    std::shared_ptr<const Features> read;
+    try {
+      read = stored().get(place, damage_);
+    } catch (const Error&) {
+      (void)writer();  // whose upload reaches the server again
+      upload_->set_reader_lost();
+      read = missing();
+    }
+    waited_ += std::chrono::steady_clock::now() - begin;
+    return read;
+  }
+
+  std::shared_ptr<const Features> missing() {
+    ++unverified_;
+    return std::make_shared<const Features>();
+  }
+
+  /// Of frames of this session that are queued.
+  FeatureReader& own_features() {
+    if (!own_features_) {
+      own_file_ = open_map(queue_, MapDatabase::Access::read);
+      own_features_.emplace(*own_file_);
+    }
+    return *own_features_;
+  }
+
+  void end_upload() {
+    last_notices_ = upload_->take_notices();
+    last_reconnections_ = upload_->reconnections();
+    last_saved_frames_ = upload_->saved_frames();
+    upload_.reset();
   }
 
   /// Throws Error (kind option) if they were made with other settings.
   void check_sessions(const MapDatabase& database) {
     for (const MapSession& session : read_sessions(database, damage_)) {
       check_same_shape(path_, session.options, options_);
-      sessions_.insert(session.session);
+      sessions_[session.session] = session;
     }
   }
 
@@ -341,16 +470,31 @@ class MapWriter::Impl {
   pid_t process_ = getpid();
   std::string path_;             ///< for messages
   LoopDetectorOptions options_;  ///< of the session
-  bool keeps_images_;
-  std::set<int> sessions_;  ///< earlier ones
+  EncodeImage encode_image_;
+  bool is_on_server_ = false;
+  std::map<int, MapSession> sessions_;  ///< earlier ones
   int session_ = 0;
-  std::int64_t first_place_ = 0;
+  SessionUpload::Begun begun_;
   PlaceId frames_ = 0;                                  ///< of this session
+  std::unique_ptr<MapDatabase> server_;                 ///< for writing; until something is written
   std::unique_ptr<MapDatabase> database_;               ///< for reading; gone after finish()
   std::unique_ptr<MapDatabase::Transaction> snapshot_;  ///< until all earlier places were read
   std::optional<StoredFeatures> stored_;
   Damage damage_;
-  std::unique_ptr<BatchWriter> writer_;
+
+  // Of a map on a server.
+  std::string queue_;                      ///< the file; empty when the server has all of it
+  std::unique_ptr<MapDatabase> own_file_;  ///< the same, for reading
+  std::optional<FeatureReader> own_features_;
+  std::chrono::nanoseconds waited_{};  ///< for features, since the last frame was added
+  std::int64_t unverified_ = 0;
+  std::vector<SessionUpload::Change> changes_;  ///< for the writer's thread
+  std::unique_ptr<SessionUpload> upload_;
+  int last_reconnections_ = 0;  ///< of the upload, when it has ended
+  std::int64_t last_saved_frames_ = 0;
+  std::vector<std::string> last_notices_;
+
+  std::unique_ptr<BatchWriter> writer_;  ///< last: its thread uses the others
 };
 
 MapWriter::MapWriter(const std::string& path, const LoopDetectorOptions& options,
@@ -375,11 +519,18 @@ MapWriter::Impl& MapWriter::impl() const {
 
 void MapWriter::check_process() const { impl_->check_process(); }
 int MapWriter::session() const { return impl().session(); }
-std::int64_t MapWriter::saved_frames() const { return impl().writer().saved_frames(); }
-int MapWriter::reconnections() const { return impl().writer().reconnections(); }
+std::int64_t MapWriter::saved_frames() const { return impl().saved_frames(); }
+int MapWriter::reconnections() const { return impl().reconnections(); }
+std::int64_t MapWriter::unverified() const { return impl().unverified(); }
+const std::string& MapWriter::queue() const { return impl().queue(); }
+void MapWriter::set_queue(const std::string& path) { impl().set_queue(path); }
+std::vector<std::string> MapWriter::take_notices() { return impl().take_notices(); }
 void MapWriter::add_pose(const MapLoopPose& pose) { impl().add_pose(pose); }
-void MapWriter::flush() { impl().writer().flush(); }
+void MapWriter::flush() { impl().flush(); }
 void MapWriter::finish() { impl().finish(); }
+void MapWriter::finish_unless(const std::function<bool()>& is_stopped) {
+  impl().finish(is_stopped);
+}
 const std::vector<std::string>& MapWriter::damage() const { return impl().damage().clauses(); }
 
 void MapWriter::check_options(const LoopDetectorOptions& options) { impl().check_options(options); }

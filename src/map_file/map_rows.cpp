@@ -185,19 +185,21 @@ constexpr std::int64_t kProbesPerStep = 10;
 /// the first of `columns`.
 template <typename Visit>
 void for_each_row(const MapDatabase& database, const std::string& table, const std::string& columns,
-                  Damage& damage, const Visit& visit) {
+                  Damage& damage, const Visit& visit, const KeyRange& keys = {}) {
   const std::string key = columns.substr(0, columns.find(','));
-  const auto statement = database.prepare(fmt::format(
-      "SELECT {} FROM {} WHERE {} >= ?1 ORDER BY {} LIMIT ?2", columns, table, key, key));
+  const auto statement = database.prepare(
+      fmt::format("SELECT {0} FROM {1} WHERE {2} >= ?1 AND {2} <= ?3 ORDER BY {2} LIMIT ?2",
+                  columns, table, key));
   SqlStatement& rows = *statement;
   const auto snapshot = database.snapshot();
   const std::int64_t at_once = database.rows_at_once();
-  std::int64_t next = 1;
+  std::int64_t next = keys.first;
   std::int64_t damaged_from = 0;  // 0: not in a damaged range
   for (std::int64_t probes = 0; probes < kMaxProbes;) {
     rows.reset();
     rows.bind(1, next);
     rows.bind(2, at_once);
+    rows.bind(3, keys.last);
     std::int64_t number = 0;
     SqlStatement::Step step = rows.step_if_readable();
     for (; step == SqlStatement::Step::row; step = rows.step_if_readable()) {
@@ -307,14 +309,16 @@ SessionFrame session_frame(const SqlStatement& row, int column) {
 
 /// The rows of `loop` or `rejected`.
 std::vector<MapLoop> read_loops_of(const MapDatabase& database, const std::string& table,
-                                   Checksum (*checksum)(const MapLoop&), Damage& damage) {
+                                   Checksum (*checksum)(const MapLoop&), Damage& damage,
+                                   const KeyRange& keys) {
   std::vector<MapLoop> loops;
   for_each_row(
       database, table,
       table +
           ", session, frame, match_session, match_frame, score, similarity, matches, "
           "inliers, checksum",
-      damage, [&](const SqlStatement& row, std::int64_t key) {
+      damage,
+      [&](const SqlStatement& row, std::int64_t key) {
         const MapLoop loop{.query = session_frame(row, 1),
                            .match = session_frame(row, 3),
                            .score = row.real(5),
@@ -327,7 +331,8 @@ std::vector<MapLoop> read_loops_of(const MapDatabase& database, const std::strin
         } else {
           damage.add(fmt::format("{} {}: its values differ from their checksum", table, key));
         }
-      });
+      },
+      keys);
   return loops;
 }
 
@@ -404,35 +409,39 @@ std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damag
 }
 
 void for_each_place(const MapDatabase& database, const std::function<void(const MapPlace&)>& visit,
-                    Damage& damage) {
+                    Damage& damage, const KeyRange& keys) {
   MapPlace place;
-  for_each_row(database, "place", "place, session, frame, timestamp, content, checksum", damage,
-               [&](const SqlStatement& row, std::int64_t key) {
-                 place.id = key;
-                 place.at = session_frame(row, 1);
-                 place.timestamp_s.reset();
-                 if (!row.is_null(3)) place.timestamp_s = row.real(3);
-                 const bool is_finite = std::isfinite(place.timestamp_s.value_or(0.0));
-                 if (is_finite && read_content(row.bytes(4), place.content) &&
-                     has_checksum(row, 5, checksum_of(place))) {
-                   visit(place);
-                 } else {
-                   damage.add(fmt::format("place {}: its content differs from its checksum", key));
-                 }
-               });
+  for_each_row(
+      database, "place", "place, session, frame, timestamp, content, checksum", damage,
+      [&](const SqlStatement& row, std::int64_t key) {
+        place.id = key;
+        place.at = session_frame(row, 1);
+        place.timestamp_s.reset();
+        if (!row.is_null(3)) place.timestamp_s = row.real(3);
+        const bool is_finite = std::isfinite(place.timestamp_s.value_or(0.0));
+        if (is_finite && read_content(row.bytes(4), place.content) &&
+            has_checksum(row, 5, checksum_of(place))) {
+          visit(place);
+        } else {
+          damage.add(fmt::format("place {}: its content differs from its checksum", key));
+        }
+      },
+      keys);
 }
 
-std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage) {
+std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage, const KeyRange& keys) {
   return read_loops_of(
-      database, "loop", [](const MapLoop& loop) { return checksum_of(loop); }, damage);
+      database, "loop", [](const MapLoop& loop) { return checksum_of(loop); }, damage, keys);
 }
 
-std::vector<MapLoop> read_rejected_loops(const MapDatabase& database, Damage& damage) {
+std::vector<MapLoop> read_rejected_loops(const MapDatabase& database, Damage& damage,
+                                         const KeyRange& keys) {
   if (!has_links(database)) return {};
-  return read_loops_of(database, "rejected", checksum_of_rejected, damage);
+  return read_loops_of(database, "rejected", checksum_of_rejected, damage, keys);
 }
 
-std::vector<MapOdometry> read_odometry(const MapDatabase& database, Damage& damage) {
+std::vector<MapOdometry> read_odometry(const MapDatabase& database, Damage& damage,
+                                       const KeyRange& keys) {
   std::vector<MapOdometry> all;
   if (!has_odometry(database)) return all;
   for_each_row(
@@ -449,13 +458,15 @@ std::vector<MapOdometry> read_odometry(const MapDatabase& database, Damage& dama
         } else {
           damage.add(fmt::format("odometry {}: its values differ from their checksum", key));
         }
-      });
+      },
+      keys);
   const auto place = [](const MapOdometry& one) { return std::pair(one.at.session, one.at.frame); };
   std::ranges::stable_sort(all, {}, place);
   return all;
 }
 
-std::vector<MapLoopPose> read_loop_poses(const MapDatabase& database, Damage& damage) {
+std::vector<MapLoopPose> read_loop_poses(const MapDatabase& database, Damage& damage,
+                                         const KeyRange& keys) {
   std::vector<MapLoopPose> poses;
   if (!has_odometry(database)) return poses;
   for_each_row(
@@ -474,8 +485,31 @@ std::vector<MapLoopPose> read_loop_poses(const MapDatabase& database, Damage& da
         } else {
           damage.add(fmt::format("relative_pose {}: its values differ from their checksum", key));
         }
-      });
+      },
+      keys);
   return poses;
+}
+
+std::map<int, KnownRows> known_rows(const MapDatabase& database, std::optional<int> session) {
+  std::map<int, KnownRows> known;
+  const auto each = [&](const std::string& columns_and_table, const auto& visit) {
+    const auto row = database.prepare(fmt::format("SELECT session, {}{}", columns_and_table,
+                                                  session ? " WHERE session = ?1" : ""));
+    if (session) row->bind(1, std::int64_t{*session});
+    while (row->step()) visit(known[narrow(row->integer(0))], *row);
+  };
+  each("frames FROM session",
+       [](KnownRows& of, const SqlStatement& row) { of.frames = row.integer(1); });
+  const auto pairs = [&](const std::string& table, std::set<KnownRows::Pair> KnownRows::*set) {
+    each("frame, match_session, match_frame FROM " + table,
+         [&](KnownRows& of, const SqlStatement& row) {
+           (of.*set).insert({row.integer(1), row.integer(2), row.integer(3)});
+         });
+  };
+  pairs("loop", &KnownRows::loops);
+  if (has_links(database)) pairs("rejected", &KnownRows::rejected);
+  if (has_odometry(database)) pairs("relative_pose", &KnownRows::poses);
+  return known;
 }
 
 MapLoop loop_of(const Detection& detection, int session) {
@@ -667,17 +701,21 @@ void remove_place(const MapDatabase& database, std::int64_t place) {
 
 void reject_loop(const MapDatabase& database, const SessionFrame& query,
                  const SessionFrame& match) {
+  reject_loop(database, MapLoop{.query = query, .match = match});
+}
+
+void reject_loop(const MapDatabase& database, MapLoop loop) {
   const auto of_pair = [&](const std::string& what) {
     auto statement = database.prepare(
         what + " WHERE session = ?1 AND frame = ?2 AND match_session = ?3 AND match_frame = ?4");
     int parameter = 0;
-    for (const int value : {query.session, query.frame, match.session, match.frame}) {
+    for (const int value :
+         {loop.query.session, loop.query.frame, loop.match.session, loop.match.frame}) {
       statement->bind(++parameter, std::int64_t{value});
     }
     return statement;
   };
   if (!of_pair("SELECT rejected FROM rejected")->step()) {
-    MapLoop loop{.query = query, .match = match};
     const auto found = of_pair("SELECT score, similarity, matches, inliers FROM loop");
     if (found->step()) {
       loop.score = found->real(0);

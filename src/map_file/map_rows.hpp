@@ -2,10 +2,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
+#include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <unordered_set>
@@ -33,6 +37,12 @@ class Damage {
   std::unordered_set<std::string> known_;
 };
 
+/// Which rows of a table are read, by their keys.
+struct KeyRange {
+  std::int64_t first = 1;
+  std::int64_t last = std::numeric_limits<std::int64_t>::max() - 1;
+};
+
 /// Throws Error (kind input) if there are `clauses`: a damaged map is neither continued nor copied.
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);
 
@@ -41,20 +51,43 @@ std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damag
 
 /// In order of id.
 void for_each_place(const MapDatabase& database, const std::function<void(const MapPlace&)>& visit,
-                    Damage& damage);
+                    Damage& damage, const KeyRange& keys = {});
 
 /// Calls visit(place, bytes) for each image, damaged or not, in order of place.
 void for_each_image(const MapDatabase& database,
                     const std::function<void(std::int64_t, std::int64_t)>& visit, Damage& damage);
 
-std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage);
-std::vector<MapLoop> read_rejected_loops(const MapDatabase& database, Damage& damage);
+std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage,
+                                const KeyRange& keys = {});
+std::vector<MapLoop> read_rejected_loops(const MapDatabase& database, Damage& damage,
+                                         const KeyRange& keys = {});
 
 /// In order of session and frame.
-std::vector<MapOdometry> read_odometry(const MapDatabase& database, Damage& damage);
+std::vector<MapOdometry> read_odometry(const MapDatabase& database, Damage& damage,
+                                       const KeyRange& keys = {});
 
 /// In the order in which they were measured.
-std::vector<MapLoopPose> read_loop_poses(const MapDatabase& database, Damage& damage);
+std::vector<MapLoopPose> read_loop_poses(const MapDatabase& database, Damage& damage,
+                                         const KeyRange& keys = {});
+
+/// What a map has of a session, so that nothing is copied to it twice.
+struct KnownRows {
+  /// Frame of the session, session and frame of the match.
+  using Pair = std::array<std::int64_t, 3>;
+
+  std::int64_t frames = 0;
+  std::set<Pair> loops = {};
+  std::set<Pair> rejected = {};
+  std::set<Pair> poses = {};  ///< loops whose relative pose is there
+
+  static Pair pair(const SessionFrame& query, const SessionFrame& match) {
+    return {query.frame, match.session, match.frame};
+  }
+};
+
+/// By session. `session`: none = all.
+std::map<int, KnownRows> known_rows(const MapDatabase& database,
+                                    std::optional<int> session = std::nullopt);
 
 /// The loop of `session` that a detection, one of a loop, is.
 MapLoop loop_of(const Detection& detection, int session);
@@ -123,5 +156,7 @@ void remove_place(const MapDatabase& database, std::int64_t place);
 /// Moves the loop to those that are rejected. If there is no such loop, the pair is recorded all
 /// the same. Linear in the loops of the map.
 void reject_loop(const MapDatabase& database, const SessionFrame& query, const SessionFrame& match);
+/// The same, with what is known of a loop that the map does not have.
+void reject_loop(const MapDatabase& database, MapLoop loop);
 
 }  // namespace loopbit

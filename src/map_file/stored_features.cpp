@@ -47,11 +47,12 @@ void StoredFeatures::begin(const std::string& path) {
   has_begun_ = true;
 }
 
-std::shared_ptr<const Features> StoredFeatures::get(PlaceId place, Damage& damage) {
+std::shared_ptr<const Features> StoredFeatures::get(PlaceId place, Damage& damage,
+                                                    FeatureReader& reader) {
   if (auto cached = cache_.find(place)) return cached;
   const StoredPlace& stored = places_.at(static_cast<std::size_t>(place));
   if (stored.id == kNoRow) return std::make_shared<const Features>();
-  auto read = reader_.read(stored.id, stored.at, damage);
+  auto read = reader.read(stored.id, stored.at, damage);
   auto features = std::make_shared<const Features>(read ? std::move(*read) : Features{});
   cache_.add(place, features);
   return features;

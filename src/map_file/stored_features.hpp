@@ -76,7 +76,11 @@ class StoredFeatures {
   std::shared_ptr<const Features> find(PlaceId place) { return cache_.find(place); }
 
   /// Empty, with a clause in `damage`, if they are lost.
-  std::shared_ptr<const Features> get(PlaceId place, Damage& damage);
+  std::shared_ptr<const Features> get(PlaceId place, Damage& damage) {
+    return get(place, damage, reader_);
+  }
+  /// The same from another database.
+  std::shared_ptr<const Features> get(PlaceId place, Damage& damage, FeatureReader& reader);
 
   void keep(PlaceId place, std::shared_ptr<const Features> features) {
     cache_.add(place, std::move(features));

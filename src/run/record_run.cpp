@@ -235,7 +235,11 @@ class RecordedRun {
         detector_(make_detector(request, map_, inputs)),
         record_(record_of(input, request)),
         folder_(make_folder(input, request, map_ ? map_->session() : 0)) {
-    if (map_) record_.map_session = map_->session();
+    if (map_) {
+      record_.map_session = map_->session();
+      map_->set_queue((std::filesystem::path(folder_.path()) / kQueueFile).string());
+      record_.map_queue = map_->queue();
+    }
     folder_.write_record(record_);
   }
 
@@ -251,6 +255,7 @@ class RecordedRun {
                                   save(poses->add(detection, detector));
                                 }
                                 listener.on_detection(detection);
+                                tell_notices(listener);
                               },
                           .on_bad_frame = listener.on_bad_frame};
     std::optional<EvidenceWriter> evidence;
@@ -296,10 +301,16 @@ class RecordedRun {
     });
   }
 
-  void close_map() {
+  void close_map(const RunListener& listener, const std::atomic<bool>& stop) {
     if (!map_) return;
-    map_->finish();
+    map_->finish_unless([&] { return stop.load(); });
+    tell_notices(listener);
     record_.map_reconnections = map_->reconnections();
+    record_.map_unverified = map_->unverified();
+    record_.map_queue = map_->queue();
+    if (record_.map_queue.empty()) return;
+    record_.map_queued_frames =
+        static_cast<std::int64_t>(folder_.detections().size()) - map_->saved_frames();
   }
 
   /// Scores the detections, and stores truth and positions. `is_cut_off`: by a stop.
@@ -332,6 +343,12 @@ class RecordedRun {
     } catch (const Error& error) {
       if (!fault_) fault_ = error;
     }
+  }
+
+  /// Of the map's server.
+  void tell_notices(const RunListener& listener) {
+    if (!map_ || !listener.on_notice) return;
+    for (const std::string& notice : map_->take_notices()) listener.on_notice(notice);
   }
 
   /// In the map, if there is one.
@@ -408,7 +425,7 @@ RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListe
   try {
     run.detect(listener, stop);
     run.correct(listener);
-    run.close_map();
+    run.close_map(listener, stop);
   } catch (const std::exception& error) {
     try {
       run.finish(error.what());

@@ -32,6 +32,8 @@ inline constexpr const char* kCorrectedKittiFile = "corrected.kitti";
 inline constexpr const char* kJudgedLoopsFile = "judged_loops.csv";
 inline constexpr const char* kGraphFile = "graph.g2o";
 inline constexpr const char* kReportFile = "report.html";
+/// Not replaced by a later run: it may hold frames that are nowhere else.
+inline constexpr const char* kQueueFile = "queue.db";
 
 /// The folder in a run folder for the run that is being replaced.
 inline constexpr const char* kEarlierFolder = "earlier_run";

@@ -90,6 +90,9 @@ void transfer(Io& io, Record& record) {
   io("/threads", record.threads);
   io.unless(std::string(), "/map/path", record.map_path);
   io.unless(0, "/map/reconnections", record.map_reconnections);
+  io.unless(std::string(), "/map/queue", record.map_queue);
+  io.unless(std::int64_t{0}, "/map/queued_frames", record.map_queued_frames);
+  io.unless(std::int64_t{0}, "/map/unverified", record.map_unverified);
   io.unless(0, "/map/session", record.map_session);
   io.unless(std::string(), "/camera", record.camera);
   io.unless(std::string(), "/odometry", record.odometry);

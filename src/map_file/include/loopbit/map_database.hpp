@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -101,6 +102,15 @@ class MapDatabase {
 
   /// Reaches the server again, for the same statements and sessions. Throws Error if it cannot.
   virtual void reconnect() = 0;
+
+  /// A server that answers later than this counts as lost; 0 = it may take any time.
+  virtual void set_time_limit(std::chrono::milliseconds limit) = 0;
+
+  /// Whatever waits for a server, now or later, ends at once with an Error. For any thread.
+  virtual void interrupt() = 0;
+
+  /// Until the transaction ends, no other one is committed.
+  virtual void hold_back_commits() const = 0;
 
   /// Call this when all is written, and nothing is read through it any more.
   virtual void close() = 0;

@@ -198,20 +198,42 @@ class MapWriter : public MapStorage {
   /// The number of committed frames of this session.
   [[nodiscard]] std::int64_t saved_frames() const;
 
-  /// How often the server of the map was lost, and its frames saved when it was back.
+  // A map on a server: frames are queued in a map file and copied from there, so that nothing waits
+  // for the server. merge_map() also copies them. While the server is lost, places whose features
+  // cannot be had are no match.
+
+  /// The file of the queue. Call this before the first frame. The default is
+  /// "town_session_2_queue.db" in the working folder; if there is such a file, it gets a number.
+  void set_queue(const std::string& path);
+
+  /// That file; empty for a map file, and after finish() if the server has everything.
+  [[nodiscard]] const std::string& queue() const;
+
+  /// How often the server did not take frames for a while, and did so later.
   [[nodiscard]] int reconnections() const;
+
+  /// How often the features of a place could not be had.
+  [[nodiscard]] std::int64_t unverified() const;
+
+  /// Sentences on the server, for the user, since the last call.
+  std::vector<std::string> take_notices();
 
   /// Saves the relative pose of a loop, unless nothing of it is known. Session 0 is this session.
   /// Throws Error (kind output).
   void add_pose(const MapLoopPose& pose);
 
-  /// Commits all frames added so far. Throws Error (kind output).
+  /// Commits all frames added so far, also on a server. Throws Error (kind output).
   void flush();
 
   /// Commits the rest and closes the file. The file then contains the whole map, without a log
   /// beside it unless another process reads it, and others may write it. Throws Error (kind
-  /// output). Later calls by the detector of this map throw Error (kind option).
+  /// output). Later calls by the detector of this map throw Error (kind option). What a server does
+  /// not take stays in queue().
   void finish();
+
+  /// The same, but as soon as `is_stopped()`, a server gets no more than two seconds, and none if
+  /// it did not take what came before.
+  void finish_unless(const std::function<bool()>& is_stopped);
 
   /// The damage that features() found so far; see MapReader::damage().
   [[nodiscard]] const std::vector<std::string>& damage() const;

@@ -25,16 +25,17 @@ struct MapCheck {
 MapCheck check_map(const std::string& path);
 
 struct MergeCounts {
-  std::int64_t sessions = 0;  ///< copied
-  std::int64_t places = 0;    ///< copied
-  std::int64_t loops = 0;     ///< copied
-  std::int64_t known = 0;     ///< sessions that `into` already had, compared by uid
+  std::int64_t sessions = 0;   ///< copied
+  std::int64_t places = 0;     ///< copied
+  std::int64_t loops = 0;      ///< copied
+  std::int64_t known = 0;      ///< sessions that `into` already had, compared by uid
+  std::int64_t continued = 0;  ///< sessions of which it had fewer frames; it gets the rest
 };
 
 /// Copies the sessions of `from` that `into` lacks, with their places and loops, completely or not
-/// at all. Creates `into` if there is none. Throws Error: kind output if `into` has a writer or
-/// cannot be written; option if the two were made with different settings; input if `from` is
-/// damaged or being written.
+/// at all, and the rest of those that it has in part. Creates `into` if there is none. Throws
+/// Error: kind output if `into` has a writer or cannot be written; option if the two were made with
+/// different settings; input if `from` is damaged or being written.
 MergeCounts merge_map(const std::string& into, const std::string& from);
 
 /// The progress of link_map(), and its result.

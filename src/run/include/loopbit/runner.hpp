@@ -29,6 +29,8 @@ struct RunListener {
   /// Optional, called by record_run() only: after the last frame, with the loops that its pose
   /// graph rejects, if there are any.
   std::function<void(const std::vector<LateLoop>&)> on_rejected = {};
+  /// Optional, called by record_run() only: a sentence on the map's server.
+  std::function<void(const std::string&)> on_notice = {};
 };
 
 /// Checks the first usable frame. Throws Error (kind option) if exclusion.seconds is set and the
