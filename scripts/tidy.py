@@ -124,12 +124,17 @@ def files_with_faults(output):
     return set(re.findall(r"^(/.+?):\d+:\d+: (?:fatal )?(?:error|warning):", output, re.MULTILINE))
 
 
-def check_batch(batch, pending, build):
+def check_batch(sources, flags, pending, build):
     """As check(), of several sources together, with flags for all. Those in which that finds faults are
     checked again by themselves: a batch may show some that they do not have."""
-    sources, flags = batch
     result = subprocess.run([TIDY, "--quiet", *BATCHED, f"--config-file={ROOT}/.clang-tidy",
                              written(sources, build), "--", *flags], capture_output=True, text=True)
+    if "[clang-diagnostic-error]" in result.stdout:
+        together = that_compile_together(sources, flags, build)
+        rest = [source for source in sources if source not in together]
+        if rest:
+            print("clang-tidy: checked later, because they define names that others define, too:", *rest)
+            return check_batch(together, flags, pending, build) + check_batch(rest, flags, pending, build)
     faulty = files_with_faults(result.stdout) if result.returncode != 0 else set()
     if result.returncode != 0 and not (faulty and faulty <= set(map(str, sources))):
         return [result.stdout or result.stderr]  # a header's
@@ -152,18 +157,14 @@ def that_compile_together(sources, flags, build):
     return sources
 
 
-def batches(todo, build):
-    """All sources, as many together as can be, and the flags for each lot."""
+def batches(todo):
+    """All sources, those together that are compiled alike, and the flags for each lot."""
     by_others = {}
     for source, entry in todo.items():
         places, others = split_flags(entry)
         by_others.setdefault(others, {})[source] = places
     for others, places in by_others.items():
-        while places:
-            flags = flags_of(places.values(), others)
-            batch = that_compile_together(list(places), flags, build)
-            yield batch, flags
-            places = {source: places[source] for source in places if source not in batch}
+        yield list(places), flags_of(places.values(), others)
 
 
 def main():
@@ -214,7 +215,7 @@ def main():
             findings = list(pool.map(check_alone, todo))
         else:
             (build / "tidy_batches").mkdir(exist_ok=True)
-            found = pool.map(lambda batch: check_batch(batch, pending, build), batches(todo, build))
+            found = pool.map(lambda batch: check_batch(*batch, pending, build), batches(todo))
             findings = [finding for of_batch in found for finding in of_batch]
     print("".join(findings), end="")
     failed = sum(map(bool, findings))

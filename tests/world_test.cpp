@@ -104,8 +104,8 @@ std::set<Pair> brute_force(const World& world, double distance_m, double turn_ra
   std::set<Pair> pairs;
   for (int query = 0; query < options.frames; ++query) {
     for (int frame = 0; frame < query; ++frame) {
-      const Pose a = world.pose(query);
-      const Pose b = world.pose(frame);
+      const LevelPose a = world.pose(query);
+      const LevelPose b = world.pose(frame);
       double turn = angle_between(a.heading_rad, b.heading_rad);
       if (options.opposite_counts) turn = std::min(turn, std::numbers::pi - turn);
       const bool near = std::hypot(a.x_m - b.x_m, a.y_m - b.y_m) <= distance_m;
@@ -164,8 +164,8 @@ TEST(WorldFloors, LookAlikeAndStandOnEachOther) {
   EXPECT_EQ(world.lap(399), 3);
   EXPECT_EQ(world.lap(400), 4);
   // Away from the ramp, and from where the camera comes back from the line of the second lap.
-  const Pose below = world.pose(60);
-  const Pose above = world.pose(260);
+  const LevelPose below = world.pose(60);
+  const LevelPose above = world.pose(260);
   EXPECT_EQ(below.z_m, 0);
   EXPECT_EQ(above.z_m, 3);
   EXPECT_EQ(world.pose(599).z_m, 6);
@@ -173,8 +173,8 @@ TEST(WorldFloors, LookAlikeAndStandOnEachOther) {
   EXPECT_GT(correlation(edges(world.render(60)), edges(world.render(260))), 0.5);
   EXPECT_EQ(world.T_world_camera(260)(1, 3), world.T_world_camera(60)(1, 3) - 3);
   for (int frame = 1; frame < options.frames; ++frame) {
-    const Pose from = world.pose(frame - 1);
-    const Pose to = world.pose(frame);
+    const LevelPose from = world.pose(frame - 1);
+    const LevelPose to = world.pose(frame);
     EXPECT_LT(std::hypot(to.x_m - from.x_m, to.y_m - from.y_m), 1.5) << frame;
     EXPECT_LT(to.z_m - from.z_m, 0.3) << frame;
   }
@@ -505,8 +505,8 @@ TEST(WorldDrive, LapsFollowEachOtherAndStayBesideTheFirst) {
     EXPECT_EQ(world.lap(frame), frame / kFramesALap) << "frame " << frame;
   }
   for (int frame = 15; frame < kFramesALap; ++frame) {
-    const Pose first = world.pose(frame);
-    const Pose second = world.pose(frame + kFramesALap);
+    const LevelPose first = world.pose(frame);
+    const LevelPose second = world.pose(frame + kFramesALap);
     const double left = -(second.x_m - first.x_m) * std::sin(first.heading_rad) +
                         (second.y_m - first.y_m) * std::cos(first.heading_rad);
     EXPECT_NEAR(left, 2.0, 0.35) << "frame " << frame;
@@ -521,8 +521,8 @@ TEST(WorldDrive, LooksWhereItDrivesWithoutLeaps) {
     options.seed = seed;
     const World world(options);
     for (int frame = 1; frame < options.frames; ++frame) {
-      const Pose from = world.pose(frame - 1);
-      const Pose to = world.pose(frame);
+      const LevelPose from = world.pose(frame - 1);
+      const LevelPose to = world.pose(frame);
       const double step = std::hypot(to.x_m - from.x_m, to.y_m - from.y_m);
       ASSERT_GT(step, 0.6 * options.spacing_m) << "frame " << frame;
       ASSERT_LT(step, 1.4 * options.spacing_m) << "frame " << frame;
@@ -601,8 +601,8 @@ TEST(WorldTruth, OppositeDirectionCountsOnlyWhenAsked) {
   WorldOptions options = small_world();
   options.reverse_second_lap = true;
   const World one_way(options);
-  const Pose out = one_way.pose(20);
-  const Pose back = one_way.pose(2 * kFramesALap - 20);
+  const LevelPose out = one_way.pose(20);
+  const LevelPose back = one_way.pose(2 * kFramesALap - 20);
   EXPECT_LT(std::hypot(out.x_m - back.x_m, out.y_m - back.y_m), options.same_place_m);
   EXPECT_NEAR(angle_between(out.heading_rad, back.heading_rad), std::numbers::pi, 0.1);
   const std::set<int> seen = queries_of(one_way.same_place());

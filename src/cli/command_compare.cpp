@@ -34,7 +34,7 @@ struct CompareFlags {
   bool open = false;
 };
 
-struct Row {
+struct ComparedRun {
   std::string name;
   Evaluation evaluation;
   std::optional<TimeSummary> time;  ///< of all steps together; loopbit's runs only
@@ -105,20 +105,20 @@ std::vector<ReportRun> read_runs(const CompareFlags& flags) {
   return runs;
 }
 
-Row row_of(const ReportRun& run) {
-  Row row{run.name, evaluate(run.list, *run.truth, run.evaluation), std::nullopt};
+ComparedRun row_of(const ReportRun& run) {
+  ComparedRun row{run.name, evaluate(run.list, *run.truth, run.evaluation), std::nullopt};
   if (run.run) row.time = summarize(run.run->detections, total_ms);
   return row;
 }
 
-void print_table(const std::vector<Row>& rows) {
+void print_table(const std::vector<ComparedRun>& rows) {
   std::size_t width = 4;
-  for (const Row& row : rows) width = std::max(width, printable(row.name).size());
+  for (const ComparedRun& row : rows) width = std::max(width, printable(row.name).size());
   fmt::print(
       "{:<{}}  revisits  recall  precision  wrong  R@100%P  avg.prec.  pair recall   mean ms    "
       "p99 ms\n",
       "run", width);
-  for (const Row& row : rows) {
+  for (const ComparedRun& row : rows) {
     const Evaluation& e = row.evaluation;
     const auto of_revisits = [&](double share) {
       return share_text(share, e.decision.positives, 4);
@@ -134,9 +134,9 @@ void print_table(const std::vector<Row>& rows) {
   }
 }
 
-void print_json(const std::vector<Row>& rows) {
+void print_json(const std::vector<ComparedRun>& rows) {
   auto json = nlohmann::ordered_json::array();
-  for (const Row& row : rows) {
+  for (const ComparedRun& row : rows) {
     auto entry = nlohmann::ordered_json::parse(to_json(row.evaluation, false));
     entry["name"] = row.name;
     if (row.time) entry["time_ms"] = {{"mean", row.time->mean}, {"p99", row.time->p99}};
@@ -147,16 +147,16 @@ void print_json(const std::vector<Row>& rows) {
   fmt::print("{}\n", printable_json(text));
 }
 
-void write_plot(const std::string& file, const std::vector<Row>& rows) {
+void write_plot(const std::string& file, const std::vector<ComparedRun>& rows) {
   std::vector<NamedEvaluation> runs;
   runs.reserve(rows.size());
-  for (const Row& row : rows) runs.push_back({row.name, row.evaluation});
+  for (const ComparedRun& row : rows) runs.push_back({row.name, row.evaluation});
   write_file(file, curve_plot(runs));
 }
 
 void compare_command(const CompareFlags& flags) {
   const std::vector<ReportRun> runs = read_runs(flags);
-  std::vector<Row> rows;
+  std::vector<ComparedRun> rows;
   rows.reserve(runs.size());
   for (const ReportRun& run : runs) rows.push_back(row_of(run));
   if (!flags.out.empty()) write_report(flags.out, runs, flags.report);

@@ -36,7 +36,7 @@ Positions positions(const World& world, std::size_t frames) {
   Positions positions;
   positions.reserve(frames);
   for (int frame = 0; static_cast<std::size_t>(frame) < frames; ++frame) {
-    const Pose pose = world.pose(frame);
+    const LevelPose pose = world.pose(frame);
     positions.emplace_back(cv::Vec3d(pose.x_m, pose.y_m, pose.z_m));
   }
   return positions;

@@ -10,7 +10,8 @@
 namespace loopbit {
 namespace {
 
-constexpr int kReach = 20;
+/// Loops of one revisit are at most so many frames apart.
+constexpr int kMaxGap = 20;
 
 /// Adds it to the nearest of `groups`, or as a new one.
 void add(std::vector<Revisit>& groups, const ReportedMatch& loop) {
@@ -20,7 +21,7 @@ void add(std::vector<Revisit>& groups, const ReportedMatch& loop) {
   const auto nearest = std::min_element(
       groups.begin(), groups.end(),
       [&](const Revisit& a, const Revisit& b) { return distance(a) < distance(b); });
-  if (nearest == groups.end() || distance(*nearest) > kReach) {
+  if (nearest == groups.end() || distance(*nearest) > kMaxGap) {
     groups.push_back({loop.query, loop.query, loop.match, loop.match, 1});
     return;
   }
@@ -42,7 +43,7 @@ std::vector<Revisit> revisits(const MatchList& list) {
   std::vector<Revisit> open;  // those that another loop may still belong to
   for (const ReportedMatch& loop : loops) {
     const auto closed = std::stable_partition(open.begin(), open.end(), [&](const Revisit& group) {
-      return loop.query - group.last_query <= kReach;
+      return loop.query - group.last_query <= kMaxGap;
     });
     groups.insert(groups.end(), closed, open.end());
     open.erase(closed, open.end());

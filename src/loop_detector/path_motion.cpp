@@ -19,7 +19,7 @@ constexpr std::array kMoves{0.25, 0.5, 0.25};
 /// Robots seldom turn round on a path.
 constexpr double kTurn = 0.01;
 
-constexpr std::ptrdiff_t kReach = kMoves.size() - 1;
+constexpr std::ptrdiff_t kMostMoved = kMoves.size() - 1;
 
 /// Of each state one step later, its probability after all frames by its predicted one.
 class Ratios {
@@ -50,11 +50,11 @@ class Ratios {
 
   /// Of the steps that `step` can be reached from or leads to, in order. What could not be
   /// predicted, such as an excluded step, was left for elsewhere.
-  [[nodiscard]] std::array<Hypothesis, 2 * kReach + 1> around(std::ptrdiff_t step) const {
-    std::array<Hypothesis, 2 * kReach + 1> near{};
-    auto found = std::ranges::lower_bound(ratios_, step - kReach, {}, &Hypothesis::step);
+  [[nodiscard]] std::array<Hypothesis, 2 * kMostMoved + 1> around(std::ptrdiff_t step) const {
+    std::array<Hypothesis, 2 * kMostMoved + 1> near{};
+    auto found = std::ranges::lower_bound(ratios_, step - kMostMoved, {}, &Hypothesis::step);
     for (Hypothesis& h : near) {
-      h = {step - kReach + (&h - near.data()), away_, away_};
+      h = {step - kMostMoved + (&h - near.data()), away_, away_};
       if (found != ratios_.end() && found->step == h.step) h = *found++;
     }
     return near;
@@ -153,8 +153,8 @@ Belief one_step_earlier(const Belief& belief, const Belief& prior, const Returns
     double forward = 0;
     double backward = 0;
     for (std::size_t moved = 0; moved < kMoves.size(); ++moved) {
-      forward += kMoves[moved] * near[kReach + moved].forward;
-      backward += kMoves[moved] * near[kReach - moved].backward;
+      forward += kMoves[moved] * near[kMostMoved + moved].forward;
+      backward += kMoves[moved] * near[kMostMoved - moved].backward;
     }
     const double turned = kTurn * (forward + backward);
     const double left = kLeave * ratios.away();

@@ -9,6 +9,8 @@
 #include <numbers>
 #include <utility>
 
+#include "loopbit/median.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -52,12 +54,6 @@ constexpr double kFullSteps = 200;
 constexpr double kFullExcess = 4;
 /// No frame can say more.
 constexpr double kMaxLogRatio = 30;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double stabilized(int count) { return std::sqrt(count + 3.0 / 8.0); }
 

@@ -16,7 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 /// A loop with the numbers of its frames, counted through all sessions.
-struct Edge {
+struct ExportedLoop {
   std::int64_t query = 0;
   std::int64_t match = 0;
   MapLoop loop;
@@ -24,13 +24,13 @@ struct Edge {
 };
 
 /// Loops of dropped sessions are left out.
-std::vector<Edge> edges_of(MapReader& map) {
+std::vector<ExportedLoop> edges_of(MapReader& map) {
   std::map<int, std::int64_t> first_frame;
   std::int64_t frames = 0;
   for (const MapSession& session : map.sessions()) {
     first_frame[session.session] = std::exchange(frames, frames + session.frames);
   }
-  std::vector<Edge> edges;
+  std::vector<ExportedLoop> edges;
   const std::vector<MapLoop> loops = map.loops();
   const std::vector<KnownMotion> motions = map.motions_of(loops);
   for (std::size_t i = 0; i < loops.size(); ++i) {
@@ -44,7 +44,7 @@ std::vector<Edge> edges_of(MapReader& map) {
   return edges;
 }
 
-std::string csv(const std::vector<Edge>& edges) {
+std::string csv(const std::vector<ExportedLoop>& edges) {
   std::string text =
       "query,match,score,query_session,query_frame,match_session,match_frame,similarity,matches,"
       "inliers\n";
@@ -58,7 +58,7 @@ std::string csv(const std::vector<Edge>& edges) {
 
 Json to_json(const SessionFrame& at) { return {{"session", at.session}, {"frame", at.frame}}; }
 
-std::string json(const MapReader& map, const std::vector<Edge>& edges) {
+std::string json(const MapReader& map, const std::vector<ExportedLoop>& edges) {
   Json json{{"sessions", Json::array()}, {"loops", Json::array()}};
   for (const MapSession& session : map.sessions()) {
     json["sessions"].push_back({{"session", session.session},
@@ -80,16 +80,16 @@ std::string json(const MapReader& map, const std::vector<Edge>& edges) {
 
 /// g2o's text format (github.com/RainerKuemmerle/g2o, "File format"): one vertex or edge per line.
 /// Edges that were not measured are identities.
-std::string g2o(const std::vector<Edge>& edges) {
+std::string g2o(const std::vector<ExportedLoop>& edges) {
   constexpr const char* kIdentityPose = "0 0 0 0 0 0 1";
   constexpr const char* kIdentityInformation = "1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1";
   std::set<std::int64_t> frames;
-  for (const Edge& edge : edges) frames.insert({edge.query, edge.match});
+  for (const ExportedLoop& edge : edges) frames.insert({edge.query, edge.match});
   std::string text;
   for (const std::int64_t frame : frames) {
     text += fmt::format("VERTEX_SE3:QUAT {} {}\n", frame, kIdentityPose);
   }
-  for (const Edge& edge : edges) {
+  for (const ExportedLoop& edge : edges) {
     text += edge.motion.known == PoseKnown::nothing
                 ? fmt::format("EDGE_SE3:QUAT {} {} {} {}", edge.match, edge.query, kIdentityPose,
                               kIdentityInformation)
@@ -102,7 +102,7 @@ std::string g2o(const std::vector<Edge>& edges) {
 }  // namespace
 
 std::string export_loops(MapReader& map, ExportFormat format) {
-  const std::vector<Edge> edges = edges_of(map);
+  const std::vector<ExportedLoop> edges = edges_of(map);
   switch (format) {
     case ExportFormat::csv:
       return csv(edges);

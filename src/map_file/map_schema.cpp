@@ -27,7 +27,7 @@ struct Table {
   int since = 1;           ///< the first version of maps that has it
 };
 
-constexpr std::array kTables{
+constexpr std::array kMapTables{
     Table{"session",
           "CREATE TABLE session (session INTEGER PRIMARY KEY AUTOINCREMENT, uid TEXT NOT NULL, "
           "name TEXT NOT NULL, started TEXT NOT NULL, loopbit TEXT NOT NULL, options TEXT NOT "
@@ -107,14 +107,14 @@ void check_tables(const Database& database, int version) {
     const auto is_this = [&](const Table& table) {
       return table.since <= version && name == table.name && sql == table.definition;
     };
-    if (!is_this(kSequences) && std::none_of(kTables.begin(), kTables.end(), is_this)) {
+    if (!is_this(kSequences) && std::none_of(kMapTables.begin(), kMapTables.end(), is_this)) {
       refuse(database, fmt::format("has a table '{}' that no map of version {} has: it was changed "
                                    "by something else; use a copy from before",
                                    name, version));
     }
     ++known;
   }
-  const auto expected = std::count_if(kTables.begin(), kTables.end(),
+  const auto expected = std::count_if(kMapTables.begin(), kMapTables.end(),
                                       [&](const Table& table) { return table.since <= version; });
   if (known != expected + 1) refuse(database, "lacks tables of a map: use a copy from before");
 }
@@ -140,7 +140,7 @@ int checked_version(const Database& database) {
 /// Each version so far adds tables. An empty file has version 0.
 void migrate(const Database& database, int from, int to) {
   if (from >= to) return;
-  for (const Table& table : kTables) {
+  for (const Table& table : kMapTables) {
     if (table.since > from && table.since <= to) database.execute(table.definition);
   }
   database.execute(

@@ -18,7 +18,7 @@ namespace {
 
 constexpr double kRadians = std::numbers::pi / 180;
 /// Files are rounded; what is further than this from a rotation is something else.
-constexpr double kMaxRotationError = 1e-3;
+constexpr double kMaxSkew = 1e-3;
 
 bool is_finite(const double* first, int count) {
   return std::all_of(first, first + count, [](double value) { return std::isfinite(value); });
@@ -29,7 +29,7 @@ bool is_rigid(const cv::Matx44d& transform) {
   const double error = cv::norm(rotation * rotation.t() - cv::Matx33d::eye(), cv::NORM_INF);
   const bool has_last_row =
       transform(3, 0) == 0 && transform(3, 1) == 0 && transform(3, 2) == 0 && transform(3, 3) == 1;
-  return has_last_row && error <= kMaxRotationError && cv::determinant(rotation) > 0;
+  return has_last_row && error <= kMaxSkew && cv::determinant(rotation) > 0;
 }
 
 bool is_covariance(const cv::Matx66d& covariance) {

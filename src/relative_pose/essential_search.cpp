@@ -9,16 +9,17 @@
 
 #include <opencv2/calib3d.hpp>
 
+#include "loopbit/median.hpp"
 #include "loopbit/ray_geometry.hpp"
 #include "loopbit/verification.hpp"
 
 namespace loopbit {
 namespace {
 
-constexpr int kStarts = 64;
-constexpr std::size_t kFewPairs = 16;
+constexpr int kDirections = 64;
+constexpr std::size_t kDrawnPairs = 16;
 constexpr std::size_t kRefined = 12;
-constexpr int kFirstSteps = 8;
+constexpr int kStepsOfDrawn = 8;
 constexpr std::size_t kMinInliers = 8;
 /// Before the pose is nearly right, pairs far from it count, too.
 constexpr double kWideGate = 1e3;
@@ -46,9 +47,7 @@ double usual_spread_px(std::span<const RayPair> pairs) {
   for (const RayPair& pair : pairs) {
     spreads.push_back(std::hypot(cv::norm(pair.query.spread), cv::norm(pair.match.spread)));
   }
-  const auto middle = spreads.begin() + static_cast<std::ptrdiff_t>(spreads.size() / 2);
-  std::nth_element(spreads.begin(), middle, spreads.end());
-  return *middle * kVirtualFocal_px / std::sqrt(2.0);
+  return median(std::move(spreads)) * kVirtualFocal_px / std::sqrt(2.0);
 }
 
 /// The pairs that fit one fundamental matrix.
@@ -75,7 +74,7 @@ std::vector<RayPair> fundamental_inliers(std::span<const RayPair> pairs, double 
 
 /// Some of `count` pairs, by chance.
 std::vector<std::size_t> drawn(std::size_t count, cv::RNG& chance) {
-  std::vector<std::size_t> result(kFewPairs);
+  std::vector<std::size_t> result(kDrawnPairs);
   for (std::size_t& index : result) {
     index = static_cast<std::size_t>(chance.uniform(0, static_cast<int>(count)));
   }
@@ -202,9 +201,9 @@ std::optional<DirectionSearch> search_direction(std::span<const RayPair> pairs, 
   const RayBlocks likely(inliers);
   std::vector<std::pair<double, RigidPose>> found;
   cv::RNG chance(1);
-  for (const cv::Vec3d& direction : half_sphere(kStarts)) {
+  for (const cv::Vec3d& direction : half_sphere(kDirections)) {
     const RayBlocks few(likely, drawn(likely.size(), chance));
-    const RigidPose pose = fit_direction(few, {rotation, direction}, kWideGate, kFirstSteps).pose;
+    const RigidPose pose = fit_direction(few, {rotation, direction}, kWideGate, kStepsOfDrawn).pose;
     found.emplace_back(cost_of(all, pose, gate), pose);
   }
   std::ranges::sort(found, {}, &std::pair<double, RigidPose>::first);

@@ -219,16 +219,16 @@ RigidPose moved(const RigidPose& pose, const cv::Vec6d& step, FitKind kind) {
 }
 
 /// J^T W J, J^T W r and the cost.
-struct Equations {
+struct PoseEquations {
   cv::Matx66d squares = cv::Matx66d::zeros();
   cv::Vec6d gradient;
   double cost = 0;
 };
 
-Equations equations_of(std::span<const RayPair> pairs, const RigidPose& pose, FitKind kind,
-                       const Noise& noise) {
+PoseEquations equations_of(std::span<const RayPair> pairs, const RigidPose& pose, FitKind kind,
+                           const Noise& noise) {
   const PoseFrame frame(pose);
-  Equations sum;
+  PoseEquations sum;
   for (const RayPair& pair : pairs) {
     const Residual residual = residual_of(pair, frame, kind);
     const double weight = noise.weight(residual);
@@ -267,11 +267,11 @@ double cost_of_all(std::span<const double> likelihoods) {
 }
 
 /// As the others, for rotation and direction.
-Equations equations_of(const RayBlocks& pairs, const RigidPose& pose, const Noise& noise) {
+PoseEquations equations_of(const RayBlocks& pairs, const RigidPose& pose, const Noise& noise) {
   DirectionSums sums;
   kernels().sum_up(direction_pose(pose), pairs.arrays(), static_cast<float>(noise.outlier(1)),
                    sums);
-  Equations result;
+  PoseEquations result;
   std::size_t entry = 0;
   for (int a = 0; a < 6; ++a) {
     result.gradient[a] = static_cast<double>(sums.gradient[a]);
@@ -309,7 +309,7 @@ cv::Matx66d inverse_within(const cv::Matx66d& squares, const cv::Matx66d& projec
 }
 
 /// The step to where the equations are 0, within what is fitted, by Cholesky's method.
-cv::Vec6d step_of(const Equations& at, double damping, const RigidPose& pose, FitKind kind) {
+cv::Vec6d step_of(const PoseEquations& at, double damping, const RigidPose& pose, FitKind kind) {
   cv::Matx66d l = at.squares;
   cv::Vec6d step = -at.gradient;
   const double size = std::max(cv::trace(l), std::numeric_limits<double>::min());
@@ -346,10 +346,10 @@ template <typename EquationsOf>
 double descend(const EquationsOf& equations, FitKind kind, int max_steps, RigidPose& pose) {
   constexpr double kMinGain = 0.01;  // far below what chance does to a cost
   double damping = 1e-4;
-  Equations at = equations(pose);
+  PoseEquations at = equations(pose);
   for (int step = 0; step < max_steps; ++step) {
     const RigidPose next = moved(pose, step_of(at, damping, pose, kind), kind);
-    const Equations there = equations(next);
+    const PoseEquations there = equations(next);
     if (!(there.cost < at.cost)) {
       if (damping > 1) break;
       damping *= 100;

@@ -12,6 +12,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "loopbit/error.hpp"
+#include "loopbit/median.hpp"
 #include "loopbit/ray_geometry.hpp"
 
 #include "essential_search.hpp"
@@ -26,12 +27,6 @@ constexpr double kUsualSigma_px = 0.5;
 constexpr int kMinPoints = 8;
 /// A pose with a cost below this multiple of the best one explains the pairs about as well.
 constexpr double kMaxWorse = 1.2;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::vector<RayPair> ray_pairs(const PoseRequest& request, std::span<const Match> matches) {
   std::vector<RayPair> pairs;

@@ -38,7 +38,7 @@ bool parse_numbers(const std::vector<std::string_view>& cells, Numbers& numbers)
   return true;
 }
 
-struct Row {
+struct PoseRow {
   std::optional<double> time_s;
   cv::Matx44d T_world_camera;
   std::optional<cv::Matx66d> covariance = std::nullopt;
@@ -51,7 +51,7 @@ cv::Matx44d transform(const cv::Vec3d& right, const cv::Vec3d& down, const cv::V
           right[2], down[2], ahead[2], position_m[2], 0,        0,       0,        1};
 }
 
-std::optional<Row> kitti_row(const Numbers& n) {
+std::optional<PoseRow> kitti_row(const Numbers& n) {
   const cv::Vec3d right(n[0], n[4], n[8]);
   const cv::Vec3d down(n[1], n[5], n[9]);
   const cv::Vec3d ahead(n[2], n[6], n[10]);
@@ -62,10 +62,10 @@ std::optional<Row> kitti_row(const Numbers& n) {
   const cv::Vec3d exact_ahead = cv::normalize(ahead);
   const cv::Vec3d exact_right = cv::normalize(down.cross(exact_ahead));
   const cv::Vec3d exact_down = exact_ahead.cross(exact_right);
-  return Row{{}, transform(exact_right, exact_down, exact_ahead, {n[3], n[7], n[11]})};
+  return PoseRow{{}, transform(exact_right, exact_down, exact_ahead, {n[3], n[7], n[11]})};
 }
 
-std::optional<Row> timed_row(double time_s, const cv::Vec3d& position_m, cv::Vec4d q) {
+std::optional<PoseRow> timed_row(double time_s, const cv::Vec3d& position_m, cv::Vec4d q) {
   const double length = cv::norm(q);
   if (!(std::abs(length - 1.0) <= kMaxRotationError)) return std::nullopt;
   q /= length;
@@ -73,20 +73,20 @@ std::optional<Row> timed_row(double time_s, const cv::Vec3d& position_m, cv::Vec
   const cv::Vec3d right(1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y));
   const cv::Vec3d down(2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x));
   const cv::Vec3d ahead(2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y));
-  return Row{time_s, transform(right, down, ahead, position_m)};
+  return PoseRow{time_s, transform(right, down, ahead, position_m)};
 }
 
-std::optional<Row> tum_row(const Numbers& n) {
+std::optional<PoseRow> tum_row(const Numbers& n) {
   return timed_row(n[0], {n[1], n[2], n[3]}, {n[4], n[5], n[6], n[7]});
 }
 
 /// Of the body, whose z axis is that of cam0 to 2 degrees.
-std::optional<Row> euroc_row(const Numbers& n) {
+std::optional<PoseRow> euroc_row(const Numbers& n) {
   constexpr double kNanosecondsPerSecond = 1e9;
   return timed_row(n[0] / kNanosecondsPerSecond, {n[1], n[2], n[3]}, {n[5], n[6], n[7], n[4]});
 }
 
-std::optional<Row> covariance_row(const Numbers& n) {
+std::optional<PoseRow> covariance_row(const Numbers& n) {
   auto row = tum_row(n);
   if (!row) return std::nullopt;
   cv::Matx66d covariance;
@@ -98,7 +98,7 @@ std::optional<Row> covariance_row(const Numbers& n) {
   return row;
 }
 
-std::optional<Row> parse_row(const std::vector<std::string_view>& cells) {
+std::optional<PoseRow> parse_row(const std::vector<std::string_view>& cells) {
   Numbers numbers{};
   if (cells.size() > numbers.size() || !parse_numbers(cells, numbers)) return std::nullopt;
   switch (cells.size()) {

@@ -50,7 +50,7 @@ void add_pixels(const cv::Mat& image, TruthMatrix& matrix) {
   }
 }
 
-TruthMatrix read_mask(const std::string& path, int views) {
+TruthMatrix read_mask_matrix(const std::string& path, int views) {
   const std::string extension = images::lower_extension(path);
   if (extension == ".jpg" || extension == ".jpeg") {
     throw Error(ErrorKind::input,
@@ -216,7 +216,7 @@ GroundTruth read_truth(const std::string& path, const TruthOptions& options,
                     options.views, frames);
   }
   if (images::is_image_name(path)) {
-    return truth_of(read_mask(path, options.views), path, options.views, frames);
+    return truth_of(read_mask_matrix(path, options.views), path, options.views, frames);
   }
   const std::vector<TextRow> rows = read_rows(path);
   switch (text_kind(path, rows)) {

@@ -237,7 +237,7 @@ int World::lap(int frame) const {
   return plan_->drive.lap(frame);
 }
 
-Pose World::pose(int frame) const {
+LevelPose World::pose(int frame) const {
   assert(frame >= 0 && frame < options().frames);
   const StreetPoint at = plan_->drive.camera(frame);
   return {at.at.x, at.at.y, plan_->drive.height_m(frame), wrap_angle(at.heading_rad)};

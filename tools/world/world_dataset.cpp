@@ -85,7 +85,7 @@ void write_image(const fs::path& path, const cv::Mat& image) {
 }
 
 /// The camera looks along its z axis; the world's x is east, its z north and its y down.
-std::string kitti_row(const Pose& pose) {
+std::string kitti_row(const LevelPose& pose) {
   const double c = std::cos(pose.heading_rad);
   const double s = std::sin(pose.heading_rad);
   return fmt::format("{:.9f} 0 {:.9f} {:.6f} 0 1 0 {:.6f} {:.9f} 0 {:.9f} {:.6f}\n", s, c, pose.x_m,

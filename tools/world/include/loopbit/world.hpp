@@ -95,7 +95,7 @@ struct WorldOptions {
 
 /// Position and heading of the camera: x east, y north, z up from its height on the lowest floor,
 /// heading from east to north in (-pi, pi].
-struct Pose {
+struct LevelPose {
   double x_m = 0.0;
   double y_m = 0.0;
   double z_m = 0.0;
@@ -122,7 +122,7 @@ class World {
 
   /// The lap of `frame`, from 0. In all members, 0 <= frame < options().frames.
   [[nodiscard]] int lap(int frame) const;
-  [[nodiscard]] Pose pose(int frame) const;
+  [[nodiscard]] LevelPose pose(int frame) const;
   [[nodiscard]] static double time_s(int frame);
 
   /// Whether `frame` lies between plain walls, as on ramps.
