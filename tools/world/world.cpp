@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -134,7 +135,9 @@ struct World::Plan {
   }
   [[nodiscard]] std::vector<View> views() const;
   [[nodiscard]] PlaceRule rule(double distance_m, double cos_turn, bool ramps) const;
-  void draw(int frame, const Camera& camera, FisheyeLens::Image& columns) const;
+  /// Of each column, its rows from the top.
+  using TakeColumn = std::function<void(int column, const std::vector<Color>& rows)>;
+  void draw(int frame, const Camera& camera, const TakeColumn& take) const;
   void store(int frame, int column, const std::vector<Color>& rows, cv::Mat& image) const;
 
   WorldOptions options;
@@ -190,8 +193,8 @@ PlaceRule World::Plan::rule(double distance_m, double cos_turn, bool ramps) cons
           static_cast<int>(std::ceil(kDrivenBetween_m / options.spacing_m)), ramps};
 }
 
-/// What a pinhole camera at a place of `frame` sees: columns, of rows.
-void World::Plan::draw(int frame, const Camera& camera, FisheyeLens::Image& columns) const {
+/// What a pinhole camera at a place of `frame` sees, column by column.
+void World::Plan::draw(int frame, const Camera& camera, const TakeColumn& take) const {
   const Town around_town = town_of(frame);
   const Scene around = scene(frame, camera.eye);
   const Light light = light_of_lap(seed, drive.lap(frame), options.light_change,
@@ -199,11 +202,12 @@ void World::Plan::draw(int frame, const Camera& camera, FisheyeLens::Image& colu
   const ColumnTracer tracer(camera, around);
   Shader shader(camera, around, around_town, light, seed);
   std::vector<Piece> pieces;
-  columns.assign(static_cast<std::size_t>(camera.width_px),
-                 std::vector<Color>(static_cast<std::size_t>(camera.height_px)));
+  std::vector<Color> rows;
   for (int column = 0; column < camera.width_px; ++column) {
+    rows.assign(static_cast<std::size_t>(camera.height_px), Color{});
     const float skyline_px = tracer.trace(column, pieces);
-    shader.draw(column, pieces, skyline_px, columns[static_cast<std::size_t>(column)]);
+    shader.draw(column, pieces, skyline_px, rows);
+    take(column, rows);
   }
 }
 
@@ -299,18 +303,21 @@ cv::Mat World::render(int frame, double right_m) const {
   assert(frame >= 0 && frame < options().frames);
   Camera camera = plan_->camera(frame);
   camera.eye = camera.eye + left_of(camera.forward) * -right_m;
-  FisheyeLens::Image columns;
-  if (options().fisheye_deg > 0) {
-    columns = FisheyeLens(camera, options().fisheye_deg * kRadPerDeg)
-                  .render([&](const Camera& face, FisheyeLens::Image& seen) {
-                    plan_->draw(frame, face, seen);
-                  });
-  } else {
-    plan_->draw(frame, camera, columns);
-  }
   cv::Mat image(camera.height_px, camera.width_px, CV_8UC3);
+  const auto store = [&](int column, const std::vector<Color>& rows) {
+    plan_->store(frame, column, rows, image);
+  };
+  if (options().fisheye_deg <= 0) {
+    plan_->draw(frame, camera, store);
+    return image;
+  }
+  const FisheyeLens lens(camera, options().fisheye_deg * kRadPerDeg);
+  const auto seen = lens.render([&](const Camera& face, FisheyeLens::Image& columns) {
+    plan_->draw(frame, face,
+                [&](int /*column*/, const std::vector<Color>& rows) { columns.push_back(rows); });
+  });
   for (int column = 0; column < camera.width_px; ++column) {
-    plan_->store(frame, column, columns[static_cast<std::size_t>(column)], image);
+    store(column, seen[static_cast<std::size_t>(column)]);
   }
   return image;
 }
