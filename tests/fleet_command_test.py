@@ -353,13 +353,33 @@ class FleetTest(CommandTest):
                    "OPERATOR(loopbit.<~>) (SELECT content FROM loopbit.place WHERE session = 1 AND frame = 3)"
                    "::loopbit.binary_content LIMIT 1")
         for user in ("viewer", "robot2"):
-            ran = subprocess.run(["psql", "-X", "-q", "-A", "-t", "-c", nearest, "-c", "EXPLAIN " + nearest.split("; ")[1],
+            ran = subprocess.run(["psql", "-X", "-q", "-A", "-t", "-c", nearest, "-c",
+                                  "EXPLAIN " + nearest.split("; ")[1],
                                   self.server.address("town", user)], capture_output=True, text=True)
             self.assertEqual(ran.stdout.splitlines()[0], "3", ran.stderr)
             self.assertIn("Index Scan using place_content", ran.stdout)
         for statement in ("CREATE FUNCTION loopbit.similarity(int) RETURNS int LANGUAGE sql AS 'SELECT 1'",
-                          "DROP EXTENSION loopbit", "ALTER EXTENSION loopbit UPDATE", "DROP INDEX loopbit.place_content"):
+                          "DROP EXTENSION loopbit", "ALTER EXTENSION loopbit UPDATE",
+                          "DROP INDEX loopbit.place_content"):
             self.assertRegex(self.as_robot2(statement).stderr, "must be owner|permission denied", statement)
+
+    @unittest.skipUnless(SEARCH, "the extension was not built")
+    def test_queries_are_answered_by_the_index_of_contents(self):
+        def uses():
+            return int(self.server.sql("town", "SELECT idx_scan FROM pg_stat_user_indexes "
+                                       "WHERE indexrelname = 'place_content'"))
+
+        images = sorted(self.images.iterdir())[1::FRAMES // 6]
+        of_file = self.lines("query", self.file, *images, "--json", "--places", "30")
+        viewer, before = self.server.address("town", "viewer"), uses()
+        ran = loopbit("query", viewer, *images, "--json", "--places", "30",
+                      environment={"PGOPTIONS": "-c enable_seqscan=off"})
+        self.assertEqual((ran.returncode, ran.stderr, ran.stdout.splitlines()), (0, "", of_file))
+        deadline = time.monotonic() + 10
+        while uses() < before + len(images) and time.monotonic() < deadline:
+            time.sleep(0.1)    # statistics come late
+        self.assertGreaterEqual(uses(), before + len(images))
+        self.assertTrue(QUICK or any(json.loads(line)["status"] == "loop" for line in of_file))
 
     def test_a_newer_version_is_refused(self):
         self.server.sql("town", "INSERT INTO loopbit.migration (version) VALUES (99)")
@@ -407,7 +427,8 @@ class FleetTest(CommandTest):
             "pg_constraint WHERE contype = 'c' AND connamespace = 'loopbit'::regnamespace")
         at = "session = 1 AND frame ="
         self.server.sql(
-            "copy", "DROP INDEX IF EXISTS loopbit.place_content", checks, f"UPDATE loopbit.place SET content = 'short' WHERE {at} 1",
+            "copy", "DROP INDEX IF EXISTS loopbit.place_content", checks,
+            f"UPDATE loopbit.place SET content = 'short' WHERE {at} 1",
             f"UPDATE loopbit.place SET timestamp = 'NaN' WHERE {at} 2",
             f"UPDATE loopbit.place SET checksum = checksum + 1 WHERE {at} 3",
             f"UPDATE loopbit.place SET content = decode(repeat('00', 600000), 'hex') WHERE {at} 4",

@@ -15,8 +15,14 @@
 #include <libpq-fe.h>
 
 #include "loopbit/binary_content.hpp"
+#include "loopbit/fleet_map.hpp"
+#include "loopbit/map_file.hpp"
+#include "loopbit/map_server.hpp"
 
 #include "full_scan.hpp"
+#include "map_support.hpp"
+#include "place_contents.hpp"
+#include "place_memory.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
@@ -243,6 +249,84 @@ TEST_F(ServerSearch, AnyOrderWithoutAQuery) {
   run("CREATE INDEX i ON t USING loopbit (c); SET enable_seqscan = off");
   const auto found = rows_of("SELECT id FROM t ORDER BY c <~> NULL");
   EXPECT_EQ(found.size(), rows.size());
+}
+
+/// A map whose two sessions have these contents, alternately 100 at a time.
+void write_map(const std::string& address, const std::vector<Row>& rows) {
+  for (const std::size_t session : {0U, 1U}) {
+    MapWriter map(address, fast_options(), "drive");
+    int frame = 0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      if (i / 100 % 2 != session) continue;
+      map.add({.frame = frame++, .status = Status::no_similar_place},
+              rows[i].content.value_or(BinaryContent{}),
+              std::make_shared<const Features>(few_features(1)), {});
+    }
+    map.finish();
+  }
+}
+
+TEST_F(ServerSearch, CandidatesOfAMapAreThoseOfAnIndex) {
+  const std::string address = std::getenv("LOOPBIT_FLEET_ADDRESS");
+  run("DROP TABLE t");
+  run("DROP EXTENSION loopbit");
+  use_fleet_maps();
+  ASSERT_TRUE(create_map(address));
+  ASSERT_EQ(setenv("PGOPTIONS", "-c enable_seqscan=off", 1), 0);
+  Random random;
+  const std::vector<Row> rows = drive(random, 0, 1200);
+  write_map(address, rows);
+  run("UPDATE loopbit.place SET checksum = checksum + 1 WHERE frame IN (3, 77, 500)");
+
+  auto map = std::make_shared<MapReader>(address);
+  ASSERT_NE(map->place_search(), nullptr);
+  PlaceMemory memory(map);
+  memory.restore_searched(0.8);
+  const PlaceContents searched(memory);
+  EXPECT_EQ(map->damage().size(), 6U);
+  PlaceIndex index;
+  MapReader whole(address);
+  BinaryContent latest_step;
+  std::ptrdiff_t steps = 0;
+  whole.for_each_earlier_place([&](const SessionFrame& at, const BinaryContent& content) {
+    EXPECT_EQ(memory.origin(index.size()), at);
+    const bool is_step =
+        index.size() == 0 || (count(content) > 0 && similarity(content, latest_step) < 0.8);
+    if (is_step) latest_step = content;
+    steps += is_step ? 1 : 0;
+    index.add(content);
+  });
+  EXPECT_EQ(whole.damage(), map->damage());
+  ASSERT_EQ(searched.size(), index.size());
+  EXPECT_GT(steps, 100);
+  EXPECT_EQ(memory.earlier_steps(), steps);
+  for (PlaceId place = 0; place < index.size(); place += 50) {
+    EXPECT_EQ(searched.content(place), index.content(place));
+  }
+
+  int asked = 0;
+  std::size_t candidates = 0;
+  const auto compare = [&](const BinaryContent& query, const RetrievalOptions& options,
+                           const PlaceTest& is_allowed = {}) {
+    const PlaceId end = asked++ % 5 == 0 ? index.size() - 250 : index.size();
+    const auto expected = index.query(query, end, options, nullptr, is_allowed);
+    candidates += expected.size();
+    EXPECT_EQ(searched.query(query, end, options, is_allowed), expected);
+  };
+  for (std::size_t i = 0; i < rows.size(); i += 2) {
+    const BinaryContent content = rows[i].content.value_or(BinaryContent{});
+    compare(shift_columns(content, static_cast<int>(i) % 9 - 4), {});
+    if (i % 20 != 0) continue;
+    compare(content, {.max_candidates = 1000, .min_similarity = 0});
+    compare(content, {.max_candidates = 3, .shift_tolerance_columns = 32, .min_spacing = 40});
+    compare(content, {.shift_tolerance_columns = 0, .max_center_distance_px = 1.5});
+    compare(content, {}, [](PlaceId place) { return place % 50 == 7; });
+    compare(content, {.min_spacing = 1}, [](PlaceId) { return false; });
+  }
+  for (const BinaryContent& query : random_contents(random, 100)) compare(query, {});
+  EXPECT_GT(asked, 1000);
+  EXPECT_GT(candidates, 10'000U);
+  unsetenv("PGOPTIONS");
 }
 
 TEST_F(ServerSearch, OtherSizesAndNonsenseAreRefused) {

@@ -135,6 +135,13 @@ bool FleetDatabase::is_being_written() const {
   return connection_.integer(kCountLocked, {parameter(kMaxSession)}) > 0;
 }
 
+bool FleetDatabase::has_search() const {
+  return connection_.integer(
+             "SELECT count(*) FROM pg_index JOIN pg_class ON pg_class.oid = indexrelid JOIN pg_am "
+             "ON pg_am.oid = relam WHERE indrelid = 'loopbit.place'::regclass AND indisvalid AND "
+             "amname = 'loopbit' AND to_regtype('loopbit.binary_content') IS NOT NULL") > 0;
+}
+
 void FleetDatabase::reconnect() {
   connection_.reconnect();
   in_transaction_ = false;

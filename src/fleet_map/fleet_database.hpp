@@ -36,6 +36,7 @@ class FleetDatabase final : public MapDatabase {
   [[nodiscard]] std::int64_t bytes() const override;
   [[nodiscard]] std::string fault() const override { return {}; }
   [[nodiscard]] std::vector<std::string> structure_faults() const override { return {}; }
+  [[nodiscard]] bool has_search() const override;
   [[nodiscard]] bool is_lost() const override { return connection_.is_lost(); }
   void reconnect() override;
   void set_time_limit(std::chrono::milliseconds limit) override {

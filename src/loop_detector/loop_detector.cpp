@@ -22,6 +22,7 @@
 #include "candidate_filter.hpp"
 #include "known_loops.hpp"
 #include "late_loops.hpp"
+#include "place_contents.hpp"
 #include "place_filter.hpp"
 #include "place_memory.hpp"
 #include "reach.hpp"
@@ -109,21 +110,14 @@ class LoopDetector::Impl {
         odometry_(options.odometry),
         paths_(odometry_, shortcuts_, Reach::views_sq(options.decision)),
         memory_(std::move(map)),
+        index_(memory_),
         filter_({[this](PlaceId place) { return origin(place); },
                  [this](const SessionFrame& at) { return find(at); },
                  [this](PlaceId place) { return spot_of(place); }}),
         workspaces_([this] { return make_workspace(); }) {
     validate(options);
     memory_.check_options(options);
-    PlaceId latest_step = 0;
-    memory_.restore([&](const BinaryContent& content) {
-      const PlaceId place = index_.add(content);
-      const bool is_step =
-          place == 0 ||
-          changes_view(content, quick_similarity(content, index_.content(latest_step)));
-      if (is_step) latest_step = place;
-      return is_step;
-    });
+    restore_places();
     memory_.restore_loops([&](std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
       known_loops_.add(step, earlier_step);
     });
@@ -377,6 +371,19 @@ class LoopDetector::Impl {
   [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
 
  private:
+  void restore_places() {
+    if (memory_.is_searched()) return memory_.restore_searched(kUnmovedSimilarity);
+    PlaceId latest_step = 0;
+    memory_.restore([&](const BinaryContent& content) {
+      const PlaceId place = index_.add(content);
+      const bool is_step =
+          place == 0 ||
+          changes_view(content, quick_similarity(content, index_.content(latest_step)));
+      if (is_step) latest_step = place;
+      return is_step;
+    });
+  }
+
   [[nodiscard]] std::unique_ptr<Workspace> make_workspace() const {
     return std::make_unique<Workspace>(
         options_, memory_, [this](PlaceId place) { return step_of(place); }, known_loops_);
@@ -573,7 +580,7 @@ class LoopDetector::Impl {
                                         Observation& seen) const {
     RetrievalOptions retrieval = options_.retrieval;
     if (detection.odometry) retrieval.max_candidates *= kLookAlikes;
-    auto similar = index_.query(seen.content, end, retrieval, nullptr, seen.is_allowed);
+    auto similar = index_.query(seen.content, end, retrieval, seen.is_allowed);
     if (!detection.odometry) return similar;
     keep_in_reach(*detection.odometry, end, seen);
     const auto most = static_cast<std::size_t>(options_.retrieval.max_candidates);
@@ -768,8 +775,8 @@ class LoopDetector::Impl {
   cv::Mat1b mask_;             ///< of all images; empty = none
   BinaryContent excluded_;     ///< by the mask
   std::optional<CameraModel> camera_;
-  PlaceIndex index_;
   PlaceMemory memory_;
+  PlaceContents index_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   RecentView recent_view_;
   AttachedParts attached_parts_;

@@ -22,7 +22,8 @@ class PlaceMemory {
   using Held = std::vector<std::shared_ptr<const Features>>;
 
   /// `map`: null = all in memory.
-  explicit PlaceMemory(std::shared_ptr<MapStorage> map) : map_(std::move(map)) {}
+  explicit PlaceMemory(std::shared_ptr<MapStorage> map)
+      : map_(std::move(map)), search_(map_ ? map_->place_search() : nullptr) {}
 
   /// Throws Error (kind option) if the map's places were made with other settings.
   void check_options(const LoopDetectorOptions& options) const {
@@ -37,6 +38,27 @@ class PlaceMemory {
     map_->for_each_earlier_place([&](const SessionFrame& at, const BinaryContent& content) {
       add_earlier(at, visit(content));
     });
+  }
+
+  /// Whether the map is searched in place of an index of its contents.
+  [[nodiscard]] bool is_searched() const { return search_ != nullptr; }
+
+  /// In place of restore(), of a map that is searched; see PlaceSearch.
+  void restore_searched(double unmoved) {
+    search_->for_each_place(
+        unmoved, [&](const SessionFrame& at, bool is_step) { add_earlier(at, is_step); });
+  }
+
+  /// Several threads may ask at once.
+  [[nodiscard]] PlaceSearch::Similar most_similar(const BinaryContent& content,
+                                                  int shift_tolerance_columns,
+                                                  std::size_t number) const {
+    const std::scoped_lock lock(map_mutex_);
+    return search_->most_similar(content, shift_tolerance_columns, number);
+  }
+  [[nodiscard]] BinaryContent searched_content(PlaceId place) const {
+    const std::scoped_lock lock(map_mutex_);
+    return search_->content(place);
   }
 
   /// Calls visit(step, earlier_step) with each loop between places restored.
@@ -100,6 +122,7 @@ class PlaceMemory {
   void add_earlier(const SessionFrame& origin, bool is_step);
 
   std::shared_ptr<MapStorage> map_;
+  PlaceSearch* search_;  ///< the map's; may be null
   std::vector<EarlierPlace> earlier_;
   std::ptrdiff_t earlier_steps_ = 0;
   std::vector<Features> features_;                              ///< without a map: of each place

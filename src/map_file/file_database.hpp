@@ -36,6 +36,7 @@ class FileDatabase final : public MapDatabase {
   [[nodiscard]] std::int64_t bytes() const override;
   [[nodiscard]] std::string fault() const override;
   [[nodiscard]] std::vector<std::string> structure_faults() const override;
+  [[nodiscard]] bool has_search() const override { return false; }
   [[nodiscard]] bool is_lost() const override { return false; }
   void reconnect() override {}
   void set_time_limit(std::chrono::milliseconds /*limit*/) override {}

@@ -26,6 +26,7 @@
 #include "file_database.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
+#include "searched_places.hpp"
 #include "session_upload.hpp"
 #include "stored_features.hpp"
 
@@ -79,6 +80,7 @@ struct MapReader::Impl {
         stored(*database, cache_mb),
         sessions(read_sessions(*database, damage)) {
     if (const std::string fault = database->fault(); !fault.empty()) damage.add(fault);
+    if (database->has_search()) searched.emplace(*database, stored, damage);
   }
 
   std::unique_ptr<MapDatabase> database;
@@ -88,6 +90,7 @@ struct MapReader::Impl {
   StoredFeatures stored;  ///< of the places that for_each_earlier_place() visited
   Damage damage;
   std::vector<MapSession> sessions;
+  std::optional<SearchedPlaces> searched;
 };
 
 MapReader::MapReader(const std::string& path, std::size_t cache_mb)
@@ -166,6 +169,8 @@ std::vector<std::string> MapReader::check_structure() const {
 void MapReader::check_options(const LoopDetectorOptions& options) {
   if (!sessions().empty()) check_detector(impl_->path, this->options(), options);
 }
+
+PlaceSearch* MapReader::place_search() { return impl_->searched ? &*impl_->searched : nullptr; }
 
 void MapReader::for_each_earlier_place(const Visit& visit) {
   impl_->stored.begin(impl_->path);

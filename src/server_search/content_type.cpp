@@ -1,6 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 // The functions of loopbit--*.sql, but for those of the index.
+#include <array>
+#include <cmath>
+
+#include <libdeflate.h>
+
 #include "content_query.hpp"
 #include "postgres.hpp"
 #include "settings.hpp"
@@ -47,6 +52,29 @@ double similarity_to(const ContentQuery& query, const void* place) {
   uint16 overlap = 0;
   max_overlaps(query, place, 1, &overlap);
   return similarity(query, overlap, count(place));
+}
+
+/// What changes_view() knows of the rows before.
+struct LatestView {
+  bool is_known;
+  ContentQuery content;
+};
+
+/// Whether a row shows another view than the latest one that did.
+bool changes_view(LatestView& latest, const void* content, double unmoved) {
+  if (latest.is_known) {
+    const bool is_empty = count(content) == 0;
+    if (is_empty || similarity_to(latest.content, content) >= unmoved) return false;
+  }
+  prepare_or_fail(content, 0, latest.content);
+  latest.is_known = true;
+  return true;
+}
+
+/// None of a session or frame that no place has, or of a time that is not finite.
+bool is_place(int64 session, int64 frame, double timestamp) {
+  const auto is_number = [](int64 value) { return value >= 0 && value <= INT32_MAX; };
+  return is_number(session) && is_number(frame) && std::isfinite(timestamp);
 }
 
 }  // namespace
@@ -162,6 +190,31 @@ Datum loopbit_distance(PG_FUNCTION_ARGS) {
   const auto& query = loopbit::server::prepared(fcinfo, PG_GETARG_POINTER(1),
                                                 loopbit::server::shift_tolerance_columns());
   PG_RETURN_FLOAT8(1 - loopbit::server::similarity_to(query, PG_GETARG_POINTER(0)));
+}
+
+PG_FUNCTION_INFO_V1(loopbit_place_checksum);
+Datum loopbit_place_checksum(PG_FUNCTION_ARGS) {
+  if (PG_ARGISNULL(0) || PG_ARGISNULL(1) || PG_ARGISNULL(3)) PG_RETURN_NULL();
+  const std::array<int64, 2> at{PG_GETARG_INT64(0), PG_GETARG_INT64(1)};
+  const double timestamp = PG_ARGISNULL(2) ? 0.0 : PG_GETARG_FLOAT8(2) + 0.0;  // not -0
+  if (!loopbit::server::is_place(at[0], at[1], timestamp)) PG_RETURN_NULL();
+  std::uint32_t checksum = libdeflate_crc32(0, at.data(), sizeof at);
+  checksum = libdeflate_crc32(checksum, &timestamp, sizeof timestamp);
+  PG_RETURN_INT64(libdeflate_crc32(checksum, PG_GETARG_POINTER(3), kContentBytes));
+}
+
+PG_FUNCTION_INFO_V1(loopbit_changes_view);
+Datum loopbit_changes_view(PG_FUNCTION_ARGS) {
+  const WindowObject window = PG_WINDOW_OBJECT();
+  auto* latest = static_cast<loopbit::server::LatestView*>(
+      WinGetPartitionLocalMemory(window, sizeof(loopbit::server::LatestView)));
+  std::array<bool, 3> is_null{};
+  const Datum content = WinGetFuncArgCurrent(window, 0, &is_null[0]);
+  const double unmoved = DatumGetFloat8(WinGetFuncArgCurrent(window, 1, &is_null[1]));
+  const bool is_whole = DatumGetBool(WinGetFuncArgCurrent(window, 2, &is_null[2]));
+  WinSetMarkPosition(window, WinGetCurrentPosition(window));  // rows before are not needed
+  if (is_null[0] || is_null[1] || is_null[2] || !is_whole) PG_RETURN_NULL();
+  PG_RETURN_BOOL(loopbit::server::changes_view(*latest, DatumGetPointer(content), unmoved));
 }
 
 }  // extern "C"

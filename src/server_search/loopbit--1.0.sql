@@ -34,6 +34,13 @@ CREATE FUNCTION distance(content binary_content, query binary_content) RETURNS d
   AS 'MODULE_PATHNAME', 'loopbit_distance' LANGUAGE C STABLE STRICT PARALLEL SAFE COST 10;
 CREATE OPERATOR <~> (LEFTARG = binary_content, RIGHTARG = binary_content, FUNCTION = distance);
 
+-- What a robot needs of a map beside similar places; see src/map_file/searched_places.cpp
+CREATE FUNCTION place_checksum(session bigint, frame bigint, "timestamp" double precision, content binary_content)
+  RETURNS bigint
+  AS 'MODULE_PATHNAME', 'loopbit_place_checksum' LANGUAGE C IMMUTABLE PARALLEL SAFE COST 10;
+CREATE FUNCTION changes_view(content binary_content, unmoved double precision, is_whole boolean) RETURNS boolean
+  AS 'MODULE_PATHNAME', 'loopbit_changes_view' LANGUAGE C IMMUTABLE WINDOW COST 10;
+
 CREATE FUNCTION loopbit_index_handler(internal) RETURNS index_am_handler
   AS 'MODULE_PATHNAME' LANGUAGE C;
 CREATE ACCESS METHOD loopbit TYPE INDEX HANDLER loopbit_index_handler;

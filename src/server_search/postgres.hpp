@@ -36,4 +36,5 @@ extern "C" {
 #include <utils/rel.h>
 #include <utils/selfuncs.h>
 #include <utils/syscache.h>
+#include <windowapi.h>
 }

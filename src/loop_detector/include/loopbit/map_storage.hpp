@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -14,6 +16,37 @@
 #include "loopbit/surf.hpp"
 
 namespace loopbit {
+
+/// The places of a map that finds similar ones itself, so that a detector does not have to hold
+/// their contents. They are numbered as in MapStorage. Not thread-safe.
+class PlaceSearch {
+ public:
+  using Visit = std::function<void(const SessionFrame&, bool is_step)>;
+
+  struct Similar {
+    std::vector<Candidate> places = {};  ///< best first; of equal ones, the earlier place first
+    bool is_all = false;                 ///< there are no others
+  };
+
+  PlaceSearch() = default;
+  virtual ~PlaceSearch() = default;
+  PlaceSearch(const PlaceSearch&) = delete;
+  PlaceSearch& operator=(const PlaceSearch&) = delete;
+  PlaceSearch(PlaceSearch&&) = delete;
+  PlaceSearch& operator=(PlaceSearch&&) = delete;
+
+  /// Calls `visit` for each place of earlier sessions, in order. The first one is a step, and so is
+  /// each that is not empty and whose similarity with the last step before it is less than
+  /// `unmoved`.
+  virtual void for_each_place(double unmoved, const Visit& visit) = 0;
+
+  /// The places most similar to a content that is shifted by up to the tolerance: at most `number`,
+  /// and those as similar as the last of them. Damaged places count, but are left out.
+  virtual Similar most_similar(const BinaryContent& content, int shift_tolerance_columns,
+                               std::size_t number) = 0;
+
+  virtual BinaryContent content(PlaceId place) = 0;
+};
 
 /// What a LoopDetector needs from a map that outlives it; map_file.hpp has the one on disk. Places
 /// are numbered from 0: first those of earlier sessions, by session and frame, then each frame that
@@ -33,6 +66,9 @@ class MapStorage {
   /// Throws Error (kind option) if the settings of binary_content or surf differ from the map's,
   /// because places made with other settings cannot be compared.
   virtual void check_options(const LoopDetectorOptions& options) = 0;
+
+  /// If the map is only read, and its places can be searched where they are. Null otherwise.
+  virtual PlaceSearch* place_search() { return nullptr; }
 
   /// Calls `visit` for each place of earlier sessions, in order.
   virtual void for_each_earlier_place(const Visit& visit) = 0;

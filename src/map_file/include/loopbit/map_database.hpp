@@ -96,6 +96,9 @@ class MapDatabase {
   /// The faults of its structure. Reads all of it.
   [[nodiscard]] virtual std::vector<std::string> structure_faults() const = 0;
 
+  /// Whether similar places can be found by an index of the database, by `<~>` of docs/fleet.md.
+  [[nodiscard]] virtual bool has_search() const = 0;
+
   /// Whether a server no longer answers. Then a transaction is lost, unless end() was called: it
   /// may have been committed or not.
   [[nodiscard]] virtual bool is_lost() const = 0;

@@ -152,6 +152,8 @@ class MapReader : public MapStorage {
   void check_options(const LoopDetectorOptions& options) override;
   /// A reader serves the queries of one LoopDetector. A second one, add(), remove() and reject()
   /// throw Error (kind option).
+  /// Of a map on a server that has the extension and its index. Without it, and of a file, null.
+  PlaceSearch* place_search() override;
   void for_each_earlier_place(const Visit& visit) override;
   void for_each_earlier_loop(const VisitLoop& visit) override;
   std::shared_ptr<const Features> features(PlaceId place) override;
