@@ -39,7 +39,8 @@ class BuildWithCMake(build_ext):
 def configure(build):
     cmake("-S", ROOT, "-B", build, "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
           "-DLOOPBIT_BUILD_PYTHON=ON", "-DLOOPBIT_BUILD_CLI=ON", "-DLOOPBIT_BUILD_TESTS=OFF",
-          "-DLOOPBIT_BUILD_BENCHMARKS=OFF", f"-DPython3_EXECUTABLE={sys.executable}",
+          "-DLOOPBIT_BUILD_BENCHMARKS=OFF", "-DLOOPBIT_BUILD_SERVER_SEARCH=OFF",
+          f"-DPython3_EXECUTABLE={sys.executable}",
           *installed_pybind11(), *shlex.split(os.environ.get("CMAKE_ARGS", "")))
 
 

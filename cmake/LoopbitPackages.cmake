@@ -11,6 +11,9 @@ set(CPACK_SOURCE_IGNORE_FILES "^${root}/build/" "^${root}/loopbit_demo/" "^${roo
                               /dist/ /__pycache__/ [.]egg-info/ "^${root}/python/loopbit/.*[.]so$")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL lib map images poses graph data dev tools python)
+if(LOOPBIT_BUILD_SERVER_SEARCH)
+  list(APPEND CPACK_COMPONENTS_ALL postgres)
+endif()
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
@@ -87,6 +90,13 @@ set(CPACK_DEBIAN_PYTHON_DESCRIPTION "${summary}: Python module
  Images are numpy arrays, results are typed objects and structured arrays.")
 set(CPACK_DEBIAN_PYTHON_PACKAGE_CONTROL_EXTRA ${PROJECT_SOURCE_DIR}/cmake/debian/postinst
                                               ${PROJECT_SOURCE_DIR}/cmake/debian/prerm)
+
+# Of no version of our libraries: the extension has its own copy of what it needs.
+set(CPACK_DEBIAN_POSTGRES_PACKAGE_NAME postgresql-15-loopbit)
+set(CPACK_DEBIAN_POSTGRES_PACKAGE_SECTION database)
+set(CPACK_DEBIAN_POSTGRES_PACKAGE_DEPENDS postgresql-15)
+set(CPACK_DEBIAN_POSTGRES_DESCRIPTION "${summary}: search in PostgreSQL
+ CREATE EXTENSION loopbit finds similar places of a map in the server.")
 
 foreach(component ${CPACK_COMPONENTS_ALL})
   string(TOUPPER ${component} upper)
