@@ -64,6 +64,8 @@ class FleetTest(CommandTest):
         images = sorted(cls.images.iterdir())
         # Longer than a server is away.
         cls.long = cls.shared / "long.txt"
+        cls.waiting = cls.shared / "waiting.txt"    # 5 frames again and again, then the session
+        cls.waiting.write_text("".join(f"{image}\n" for image in 60 * images[HALF:HALF + 5] + images[HALF:]))
         cls.long.write_text("".join(f"{image}\n" for image in LAPS * images[HALF:]))
         for name, files in (("first", images[:HALF]), ("second", images[HALF:])):
             folder = cls.shared / name
@@ -113,8 +115,10 @@ class FleetTest(CommandTest):
         viewer = self.server.address("town", "viewer")
         shown = self.server.address("town", "viewer", None)
         image = sorted(self.images.iterdir())[3]
-        self.assertEqual(self.lines("query", viewer, image, "--json"),
-                         self.lines("query", self.file, image, "--json"))
+        answer = json.loads(self.lines("query", viewer, image, "--json")[0])
+        self.assertIn(answer.pop("epoch", None),    # none if the server searches
+                      (None, int(self.server.sql("town", "SELECT max(epoch) FROM loopbit.batch"))))
+        self.assertEqual(answer, json.loads(self.lines("query", self.file, image, "--json")[0]))
         for form in ("csv", "g2o"):
             self.assertEqual(self.lines("map", "export", viewer, "--format", form),
                              self.lines("map", "export", self.file, "--format", form))
@@ -210,13 +214,13 @@ class FleetTest(CommandTest):
         return address
 
     @contextlib.contextmanager
-    def second_run(self, address, out):
+    def second_run(self, address, out, sessions=2, images=None):
         """The second session, stopped when the server has some of it."""
-        with subprocess.Popen([LOOPBIT, "run", self.long, "--map", address, "--out", out,
+        with subprocess.Popen([LOOPBIT, "run", images or self.long, "--map", address, "--out", out,
                                "--no-report", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
                               text=True) as run:
             name = address.rsplit("/", 1)[1]
-            while self.server.sql(name, "SELECT count(*) FROM loopbit.session") != "2\n":
+            while self.server.sql(name, "SELECT count(*) FROM loopbit.session") != f"{sessions}\n":
                 self.assertIsNone(run.poll())
             run.send_signal(signal.SIGSTOP)
             yield run
@@ -224,14 +228,15 @@ class FleetTest(CommandTest):
     def assert_all_is_saved(self, name, out):
         """The map `name` has all that the long run in `out` found, once."""
         rows = decisions(out)
-        self.assertIn(f"2 sessions, {HALF + len(rows)} places", self.lines("map", "check", self.server.address(name))[-1])
+        checked = self.lines("map", "check", self.server.address(name))
+        self.assertIn(f"2 sessions, {HALF + len(rows)} places", checked[-1])
         found = [(row["frame"], row["match"]) for row in rows if row["status"] == "loop"]
         with (out / "late_loops.csv").open(newline="") as file:
             for row in csv.DictReader(file):
                 change = found.append if row["kind"] == "late" else found.remove
                 change((row["frame"], row["match"]))
-        loops = self.server.sql(name, "SELECT frame, CASE match_session WHEN 2 THEN '' ELSE match_session || ':' END"
-                                " || match_frame FROM loopbit.loop WHERE session = 2")
+        loops = self.server.sql(name, "SELECT frame, CASE match_session WHEN 2 THEN '' ELSE "
+                                "match_session || ':' END || match_frame FROM loopbit.loop WHERE session = 2")
         self.assertEqual(sorted(tuple(line.split("|")) for line in loops.splitlines()), sorted(found))
 
     def test_a_server_that_crashes_costs_no_frame(self):
@@ -305,6 +310,38 @@ class FleetTest(CommandTest):
         self.lines("map", "merge", address, out / "queue.db")
         self.assertEqual(self.server.sql("frozen", "SELECT frames FROM loopbit.session WHERE session = 2"),
                          f"{frames}\n")
+
+    def test_robots_recognise_what_others_add_meanwhile(self):
+        self.server.sql("postgres", "CREATE DATABASE together")
+        self.addCleanup(self.server.sql, "postgres", "DROP DATABASE together WITH (FORCE)")
+        address = self.server.address("together")
+        self.lines("map", "create", address)
+        first = self.scratch / "first"
+        with self.second_run(address, first, 1, self.waiting) as run:
+            frames = len(decisions(first))
+            ran = loopbit("run", self.shared / "first", "--map", address, "--out", self.out, "--no-report")
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            image = sorted(self.images.iterdir())[3]
+            query = ("query", address, image, "--json", "--epoch")
+            epoch = int(self.server.sql("together", "SELECT max(epoch) FROM loopbit.batch"))
+            answer = self.lines(*query, epoch)
+            self.assertEqual(json.loads(answer[0])["epoch"], epoch)
+            run.send_signal(signal.SIGCONT)
+            stdout, stderr = run.communicate()
+        self.assertEqual(run.returncode, 0, stderr)
+        elsewhere = [row for row in decisions(first) if row["status"] == "loop" and row["match"].startswith("2:")]
+        self.assertTrue(QUICK or elsewhere)
+        self.assertTrue(all(int(row["frame"]) >= frames for row in elsewhere))
+        with (first / "epochs.csv").open(newline="") as file:
+            epochs = [(int(row["frame"]), int(row["epoch"])) for row in csv.DictReader(file)]
+        self.assertEqual(epochs, sorted(set(epochs)))
+        self.assertGreater(epochs[-1][1], epoch)
+        as_of = [json.loads(line)["epoch"] for line in stdout.splitlines() if '"earlier_match"' in line
+                 and '"type":"loop"' in line]
+        self.assertTrue(QUICK or min(as_of) >= 2)
+        self.assertEqual(self.lines(*query, epoch), answer)    # although the map has grown
+        self.assertNotEqual(self.lines(*query, 1), answer)
+        self.assert_fails(loopbit(*query, 10000), 2, "10000")
 
     def test_a_full_server_is_brought_up_to_date_later(self):
         address = self.new_town("filled")
@@ -400,8 +437,9 @@ class FleetTest(CommandTest):
             self.assertEqual(self.as_robot2(f"WITH done AS ({statement} RETURNING 1) "
                                             "SELECT count(*) FROM done").stdout, "0\n", statement)
         for statement, why in (
-                ("INSERT INTO loopbit.loop (session, frame, match_session, match_frame, score, "
-                 "similarity, matches, inliers, checksum) VALUES (1, 2, 1, 1, 1, 1, 1, 1, 1)",
+                ("SELECT nextval('loopbit.batch_number'); INSERT INTO loopbit.loop (session, frame, "
+                 "match_session, match_frame, score, similarity, matches, inliers, checksum) VALUES "
+                 "(1, 2, 1, 1, 1, 1, 1, 1, 1)",
                  "row-level security"),
                 ("INSERT INTO loopbit.linked VALUES (1, 0) ON CONFLICT (session) DO UPDATE SET checksum = 1",
                  "row-level security"),

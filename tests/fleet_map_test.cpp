@@ -4,9 +4,12 @@
 // fleet_command_test.py starts one.
 #include "loopbit/fleet_map.hpp"
 
+#include <chrono>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -141,6 +144,76 @@ TEST_F(FleetMap, ASessionIsNotLinkedOnceAnEarlierOneGrows) {
   three.flush();
   EXPECT_EQ(sql("SELECT string_agg(session::text, ' ') FROM loopbit.linked"), "1");
   EXPECT_GT(one.reconnections(), 0);
+}
+
+TEST_F(FleetMap, ARobotLearnsWhatOthersAddMeanwhile) {
+  add_session(address, 5);
+  MapWriter me(address, fast_options(), "me");
+  me.for_each_earlier_place([](const SessionFrame&, const BinaryContent&) {});
+  me.for_each_earlier_loop([](const SessionFrame&, const SessionFrame&) {});
+  EXPECT_EQ(me.epoch(), 1);
+  add_frame(me, 0);
+  me.flush();
+  MapWriter other(address, fast_options(), "other");
+  MapNews all;
+  const auto learn_until = [&](std::int64_t epoch) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (all.epoch < epoch && std::chrono::steady_clock::now() < end) {
+      const MapNews news = me.news();
+      all.epoch = news.epoch;
+      all.places.insert(all.places.end(), news.places.begin(), news.places.end());
+      all.loops.insert(all.loops.end(), news.loops.begin(), news.loops.end());
+      all.rejected.insert(all.rejected.end(), news.rejected.begin(), news.rejected.end());
+    }
+    EXPECT_EQ(all.epoch, epoch);
+  };
+  for (int frame = 0; frame < 3; ++frame) {
+    add_frame(other, frame, frame == 1 ? std::optional(SessionFrame{2, 0}) : std::nullopt);
+    other.flush();
+  }
+  learn_until(5);
+  ASSERT_EQ(all.places.size(), 3U);
+  for (int frame = 0; frame < 3; ++frame) {
+    EXPECT_EQ(all.places[static_cast<std::size_t>(frame)].at, (SessionFrame{3, frame}));
+    EXPECT_EQ(all.places[static_cast<std::size_t>(frame)].content, content_of(frame));
+    EXPECT_TRUE(same_features(*me.features(-1 - frame), few_features(frame)));
+  }
+  ASSERT_EQ(all.loops.size(), 1U);
+  EXPECT_EQ(all.loops[0].query, (SessionFrame{3, 1}));
+  EXPECT_EQ(all.loops[0].match, (SessionFrame{0, 0}));
+  other.reject({0, 1}, {2, 0});
+  other.flush();
+  learn_until(6);
+  EXPECT_EQ(all.rejected.size(), 1U);
+  sql("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE application_name = 'loopbit'");
+  add_frame(other, 3);
+  other.flush();
+  learn_until(7);
+  EXPECT_EQ(all.places.size(), 4U);
+  EXPECT_EQ(me.unverified(), 0);
+}
+
+TEST_F(FleetMap, AReaderSeesTheMapAsOfAnEpoch) {
+  add_session(address, 5, "first", SessionFrame{1, 0});
+  add_session(address, 4, "second", SessionFrame{1, 2});
+  const auto seen = [&](MapReader& map) {
+    std::size_t places = 0;
+    std::size_t loops = 0;
+    map.for_each_earlier_place([&](const SessionFrame&, const BinaryContent&) { ++places; });
+    map.for_each_earlier_loop([&](const SessionFrame&, const SessionFrame&) { ++loops; });
+    return std::pair(places, loops);
+  };
+  MapReader now(address);
+  EXPECT_EQ(seen(now), (std::pair<std::size_t, std::size_t>(9, 2)));
+  EXPECT_EQ(now.epoch(), 2);
+  MapReader then(address);
+  then.set_epoch(1);
+  EXPECT_EQ(seen(then), (std::pair<std::size_t, std::size_t>(5, 1)));
+  EXPECT_EQ(then.epoch(), 1);
+  expect_error(ErrorKind::option, {"1 to 2", "3"}, [&] { now.set_epoch(3); });
+  add_session(path("file.db"), 1);
+  expect_error(ErrorKind::option, {"file.db", "no epochs"},
+               [&] { MapReader(path("file.db")).set_epoch(1); });
 }
 
 TEST_F(FleetMap, WhatTheServerDoesNotTakeIsMergedLater) {

@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -35,6 +36,134 @@ class MapSession : public ScratchTest {
     return detections;
   }
 };
+
+/// A map in memory that another robot's session, recorded before, is added to.
+class GrowingMap : public MapStorage {
+ public:
+  GrowingMap(const std::string& path, int session) {
+    MapReader map(path);
+    for (const MapPlace& place : places_of(map)) {
+      theirs_.push_back({{session, place.at.frame},
+                         place.content,
+                         std::make_shared<Features>(*map.features_of(place))});
+    }
+  }
+
+  /// The next `number` places are there from the beginning, or news.
+  void reveal(std::size_t number, bool from_the_beginning) {
+    (from_the_beginning ? earlier_ : known_) += number;
+  }
+
+  void tell(const MapNews::Loop& loop) { loops_.push_back(loop); }
+
+  void check_options(const LoopDetectorOptions& /*options*/) override {}
+  void for_each_earlier_place(const Visit& visit) override {
+    for (std::size_t i = 0; i < earlier_; ++i) visit(theirs_[i].at, theirs_[i].content);
+    known_ = told_ = earlier_;
+  }
+  void for_each_earlier_loop(const VisitLoop& /*visit*/) override {}
+  std::int64_t epoch() override { return 1; }
+  MapNews news() override {
+    MapNews news{.epoch = static_cast<std::int64_t>(1 + known_),
+                 .loops = std::exchange(loops_, {})};
+    for (; told_ < known_; ++told_)
+      news.places.push_back({theirs_[told_].at, theirs_[told_].content});
+    return news;
+  }
+  std::shared_ptr<const Features> features(PlaceId place) override {
+    const auto number = static_cast<std::size_t>(place < 0 ? -(place + 1) : place);
+    if (place < 0) return theirs_[earlier_ + number].features;
+    return number < earlier_ ? theirs_[number].features : ours_[number - earlier_];
+  }
+  void add(const Detection& /*detection*/, const BinaryContent& /*content*/,
+           std::shared_ptr<const Features> features, const cv::Mat& /*image*/) override {
+    ours_.push_back(std::move(features));
+  }
+  void remove(PlaceId /*place*/) override {}
+  void reject(const SessionFrame& /*query*/, const SessionFrame& /*match*/) override {}
+
+ private:
+  struct Theirs {
+    SessionFrame at;
+    BinaryContent content;
+    std::shared_ptr<const Features> features;
+  };
+
+  std::vector<Theirs> theirs_;
+  std::vector<std::shared_ptr<const Features>> ours_;
+  std::vector<MapNews::Loop> loops_;
+  std::size_t earlier_ = 0;
+  std::size_t known_ = 0;
+  std::size_t told_ = 0;
+};
+
+TEST_F(MapSession, NewsBeforeTheFirstFrameIsAsAnEarlierSession) {
+  drive(0, kPlaces - 1);
+  std::vector<std::shared_ptr<GrowingMap>> maps;
+  std::vector<LoopDetector> detectors;
+  for (const bool from_the_beginning : {true, false}) {
+    maps.push_back(std::make_shared<GrowingMap>(path("map.db"), 7));
+    if (from_the_beginning) maps.back()->reveal(kPlaces, true);
+    detectors.emplace_back(fast_options(), maps.back());
+  }
+  maps[1]->reveal(kPlaces, false);
+  int loops = 0;
+  // Later, its own places are candidates, too: those beside the others' last ones by number.
+  for (int frame = 0; frame < kPlaces - 5; ++frame) {
+    const cv::Mat1b image = view(5 + frame, {6, 2});
+    const Detection before = detectors[0].process(image);
+    const Detection news = detectors[1].process(image);
+    EXPECT_EQ(news.status, before.status) << frame;
+    EXPECT_EQ(news.earlier_match, before.earlier_match) << frame;
+    EXPECT_EQ(news.match, before.match) << frame;
+    EXPECT_EQ(news.score, before.score) << frame;
+    EXPECT_EQ(news.similarity, before.similarity) << frame;
+    EXPECT_EQ(news.epoch, 1 + kPlaces);
+    loops += news.status == Status::loop && news.earlier_match.has_value();
+  }
+  EXPECT_GT(loops, kPlaces / 2);
+}
+
+TEST_F(MapSession, PlacesThatOthersAddMeanwhileAreRecognised) {
+  drive(0, kPlaces - 1);
+  const auto map = std::make_shared<GrowingMap>(path("map.db"), 7);
+  LoopDetector detector(fast_options(), map);
+  for (int place = 0; place < 6; ++place) {
+    EXPECT_NE(detector.process(view(place, {6, 2})).status, Status::loop);
+  }
+  map->reveal(10, false);
+  for (int place = 6; place < kPlaces; ++place) {
+    if (place == 9) map->reveal(kPlaces - 10, false);
+    const Detection found = detector.process(view(place, {6, 2}));
+    EXPECT_EQ(found.status, Status::loop) << place;
+    EXPECT_EQ(found.earlier_match, (SessionFrame{7, place}));
+    EXPECT_EQ(found.epoch, place < 9 ? 11 : 1 + kPlaces);
+  }
+  const std::vector<SessionFrame> allowed{{7, 3}, {7, 20}};
+  EXPECT_EQ(detector.query(view(3), std::nullopt, nullptr, nullptr, allowed).earlier_match,
+            (SessionFrame{7, 3}));
+  EXPECT_FALSE(detector.features_of({7, 3}).keypoints.empty());
+  detector.remove({7, 3});
+  EXPECT_NE(detector.query(view(3)).earlier_match, (SessionFrame{7, 3}));
+  EXPECT_TRUE(detector.features_of({7, 3}).keypoints.empty());
+  expect_error(ErrorKind::option, {"session 7, frame 99"}, [&] { detector.remove({7, 99}); });
+}
+
+TEST_F(MapSession, LoopsThatOthersFindTellLapsFromRivals) {
+  drive(0, kPlaces - 1);
+  std::vector<double> rivals;
+  for (const bool tells : {false, true}) {
+    const auto map = std::make_shared<GrowingMap>(path("map.db"), 7);
+    LoopDetector detector(fast_options(), map);
+    for (int place = 0; place < kPlaces; ++place) detector.process(view(place, {6, 2}));
+    map->reveal(kPlaces, false);
+    for (int place = 0; tells && place < kPlaces; ++place) map->tell({{7, place}, {0, place}});
+    const Detection found = detector.process(view(4, {3, 1}));
+    ASSERT_TRUE(found.terms.has_value());
+    rivals.push_back(found.terms->rivals);
+  }
+  EXPECT_GT(rivals[1], rivals[0]);
+}
 
 TEST_F(MapSession, AMapChangesNothingWithinASession) {
   const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");

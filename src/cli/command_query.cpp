@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -44,6 +45,7 @@ struct QueryFlags {
   std::size_t places = 3;
   std::string place_images;
   std::size_t map_cache_mb = kMapCache_mb;
+  std::optional<std::int64_t> epoch;
   std::vector<std::string> settings;
   int max_megapixels = kMaxMegapixels;
   bool json = false;
@@ -77,6 +79,12 @@ struct ShownPlace {
   std::string image = {};  ///< its file; empty if there is none
 };
 
+std::shared_ptr<MapReader> open_map(const QueryFlags& flags) {
+  auto map = std::make_shared<MapReader>(flags.map, flags.map_cache_mb);
+  if (flags.epoch) map->set_epoch(*flags.epoch);
+  return map;
+}
+
 void print_row(const std::string& image, std::string_view status, const ShownPlace& shown) {
   const RankedPlace& place = shown.ranked;
   fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7.4f}  {:>10.3f}  {:>7}{}{}\n", image, status,
@@ -87,6 +95,7 @@ void print_row(const std::string& image, std::string_view status, const ShownPla
 /// What a map says of an image.
 struct Answer {
   Status status = Status::unreadable;
+  std::int64_t epoch = 0;  ///< see Detection
   std::vector<ShownPlace> places = {};
   std::optional<RelativePose> pose =
       std::nullopt;  ///< of the image, in the frame of the first place
@@ -135,6 +144,7 @@ void print_line(const std::string& image, const Answer& answer) {
   nlohmann::ordered_json json{{"image", image},
                               {"status", to_string(answer.status)},
                               {"places", nlohmann::ordered_json::array()}};
+  if (answer.epoch > 0) json["epoch"] = answer.epoch;
   for (const auto& [place, file] : answer.places) {
     json["places"].push_back({{"session", place.place.session},
                               {"frame", place.place.frame},
@@ -155,7 +165,7 @@ class Relocalizer {
  public:
   explicit Relocalizer(const QueryFlags& flags)
       : flags_(flags),
-        map_(std::make_shared<MapReader>(flags.map, flags.map_cache_mb)),
+        map_(open_map(flags)),
         detector_(detector_options(*map_, flags), map_),
         surf_(detector_.options().surf) {
     if (!flags.mask.empty()) {
@@ -202,7 +212,9 @@ class Relocalizer {
     try {
       if (!frame.error.empty()) throw Error(ErrorKind::input, frame.error);
       if (camera_) check_size(*camera_, fmt::format("'{}'", flags_.camera), frame.image.size());
-      answer.status = detector_.query(frame.image, std::nullopt, &places).status;
+      const Detection detection = detector_.query(frame.image, std::nullopt, &places);
+      answer.status = detection.status;
+      answer.epoch = detection.epoch;
       any_readable_ = true;
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;
@@ -279,6 +291,10 @@ void add_query(CLI::App& app, int& exit_code) {
       ->add_option("--place-images", flags->place_images,
                    "A new folder for the images of the places shown, if the map has any")
       ->type_name("DIR");
+  command
+      ->add_option("--epoch", flags->epoch,
+                   "Answer as of this epoch of a map on a server, as when that was its last commit")
+      ->type_name("N");
   add_map_cache_flag(*command, flags->map_cache_mb);
   add_image_flag(*command, flags->max_megapixels);
   add_topic_flag(*command, flags->topic);

@@ -57,6 +57,7 @@ void JsonLines::add(const Detection& detection) {
   Line line{{"type", "loop"}, {"frame", detection.frame}, {"name", detection.name}};
   if (detection.timestamp_s) line["timestamp_s"] = *detection.timestamp_s;
   add_match(line, detection, names_);
+  if (detection.epoch > 0) line["epoch"] = detection.epoch;
   line["score"] = detection.score;
   if (const auto& terms = detection.terms) {
     line["terms"] = {{"votes", terms->votes},

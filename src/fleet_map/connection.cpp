@@ -139,6 +139,7 @@ void Connection::reconnect() {
   prepared_.clear();
   handle_.reset(connect(address_, is_interrupted_));
   is_given_up_ = false;
+  is_listening_ = false;
   begin();
 }
 
@@ -164,6 +165,28 @@ Result Connection::execute(const std::string& sql) const {
   check_not_given_up();
   PQsendQuery(handle_.get(), sql.c_str());
   return checked(answer());
+}
+
+void Connection::wait_for_notification(const std::string& channel, std::chrono::milliseconds most) {
+  if (!std::exchange(is_listening_, true)) {
+    execute("LISTEN " + channel);
+    return;
+  }
+  const auto end = std::chrono::steady_clock::now() + most;
+  pollfd server{.fd = PQsocket(handle_.get()), .events = POLLIN, .revents = 0};
+  const auto take = [this] {
+    const std::unique_ptr<PGnotify, decltype(&PQfreemem)> one(PQnotifies(handle_.get()), PQfreemem);
+    return one != nullptr;
+  };
+  while (!is_interrupted_ && std::chrono::steady_clock::now() < end) {
+    bool is_told = false;
+    while (take()) is_told = true;
+    if (is_told) return;
+    if (poll(&server, 1, static_cast<int>(kSlice.count())) == 0) continue;
+    if (PQconsumeInput(handle_.get()) == 0) {
+      fail(one_line(PQerrorMessage(handle_.get())), remedy_for("", shown_));
+    }
+  }
 }
 
 void Connection::check_not_given_up() const {

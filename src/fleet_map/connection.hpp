@@ -57,6 +57,9 @@ class Connection {
   /// Connects again. Statements remain valid.
   void reconnect();
 
+  /// Waits for one of `channel`, at most so long. The first call on a connection returns at once.
+  void wait_for_notification(const std::string& channel, std::chrono::milliseconds most);
+
   /// See MapDatabase.
   void set_time_limit(std::chrono::milliseconds limit) { limit_ = limit; }
   void interrupt() { is_interrupted_ = true; }
@@ -89,7 +92,8 @@ class Connection {
   std::unique_ptr<PGconn, Finish> handle_;
   mutable std::map<std::string, std::string> prepared_;  ///< names by statement
   std::chrono::milliseconds limit_{0};                   ///< of an answer; 0 = none
-  mutable bool is_given_up_ = false;                     ///< an answer did not come in time
+  bool is_listening_ = false;
+  mutable bool is_given_up_ = false;  ///< an answer did not come in time
 };
 
 /// A statement with parameters ?1, ?2 and so on. All of its rows are in memory.

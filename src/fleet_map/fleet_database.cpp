@@ -151,6 +151,14 @@ void FleetDatabase::reconnect() {
   connection_.run(kLockSession, {parameter(session_)});
 }
 
+std::int64_t FleetDatabase::epoch() const {
+  return connection_.integer("SELECT coalesce(max(epoch), 0) FROM batch");
+}
+
+void FleetDatabase::wait_for_commit(std::chrono::milliseconds most) {
+  connection_.wait_for_notification("loopbit_batch", most);
+}
+
 void FleetDatabase::hold_back_commits() const {
   connection_.execute("SELECT pg_advisory_xact_lock(1819242352, 0)");
 }

@@ -43,6 +43,8 @@ class FleetDatabase final : public MapDatabase {
     connection_.set_time_limit(limit);
   }
   void interrupt() override { connection_.interrupt(); }
+  [[nodiscard]] std::int64_t epoch() const override;
+  void wait_for_commit(std::chrono::milliseconds most) override;
   void hold_back_commits() const override;
   void close() override {}
 

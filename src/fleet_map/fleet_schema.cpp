@@ -66,12 +66,15 @@ CREATE TABLE loop (
   similarity double precision NOT NULL CHECK (abs(similarity) < 'Infinity'),
   matches bigint NOT NULL,
   inliers bigint NOT NULL,
-  checksum bigint NOT NULL);
+  checksum bigint NOT NULL,
+  batch bigint NOT NULL DEFAULT currval('batch_number')
+    REFERENCES batch DEFERRABLE INITIALLY DEFERRED);
 CREATE TABLE rejected (
   LIKE loop INCLUDING CONSTRAINTS,
   rejected bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
   FOREIGN KEY (session) REFERENCES session);
 ALTER TABLE rejected DROP COLUMN loop;
+ALTER TABLE rejected ALTER COLUMN batch SET DEFAULT currval('batch_number');
 CREATE TABLE odometry (
   odometry bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY,
   session bigint NOT NULL REFERENCES session,
@@ -95,6 +98,8 @@ ALTER TABLE image ALTER COLUMN image SET STORAGE EXTERNAL;
 CREATE INDEX ON place (session);
 CREATE INDEX ON place (batch);
 CREATE INDEX ON loop (session, frame);
+CREATE INDEX ON loop (batch);
+CREATE INDEX ON rejected (batch);
 CREATE INDEX ON rejected (session, frame))";
 
 /// The lock makes epochs follow each other as commits do. Sessions that began after one that grows
@@ -111,6 +116,7 @@ BEGIN
   DELETE FROM linked WHERE
     session > (SELECT min(place.session) FROM place WHERE batch = currval('batch_number')) AND
     session NOT IN (SELECT place.session FROM place WHERE batch = currval('batch_number'));
+  PERFORM pg_notify('loopbit_batch', '');
   RETURN now_epoch;
 END
 $$;
@@ -129,8 +135,11 @@ GRANT EXECUTE ON FUNCTION end_batch() TO loopbit_writer;
 GRANT INSERT (session, uid, name, started, loopbit, options, frames, checksum),
   UPDATE (frames, checksum) ON session TO loopbit_writer;
 GRANT INSERT (place, session, frame, timestamp, content, checksum), DELETE ON place TO loopbit_writer;
-GRANT INSERT, DELETE ON features, image, loop TO loopbit_writer;
-GRANT INSERT ON rejected, odometry, relative_pose TO loopbit_writer;
+GRANT INSERT, DELETE ON features, image TO loopbit_writer;
+GRANT DELETE ON loop TO loopbit_writer;
+GRANT INSERT (session, frame, match_session, match_frame, score, similarity, matches, inliers, checksum)
+  ON loop, rejected TO loopbit_writer;
+GRANT INSERT ON odometry, relative_pose TO loopbit_writer;
 GRANT INSERT, UPDATE (checksum) ON linked TO loopbit_writer;
 ALTER TABLE session ENABLE ROW LEVEL SECURITY;
 CREATE POLICY readable ON session FOR SELECT TO loopbit_reader USING (true);

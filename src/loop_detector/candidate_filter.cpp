@@ -11,13 +11,19 @@
 namespace loopbit {
 namespace {
 
+/// Places of MapStorage::news() have negative numbers.
+std::size_t index_of(PlaceId place) {
+  return place < 0 ? 2 * static_cast<std::size_t>(-(place + 1)) + 1
+                   : 2 * static_cast<std::size_t>(place);
+}
+
 bool is_marked(PlaceId place, const std::vector<bool>& marks) {
-  const auto index = static_cast<std::size_t>(place);
+  const std::size_t index = index_of(place);
   return index < marks.size() && marks[index];
 }
 
 void mark(PlaceId place, std::vector<bool>& marks) {
-  const auto index = static_cast<std::size_t>(place);
+  const std::size_t index = index_of(place);
   if (index >= marks.size()) marks.resize(index + 1);
   marks[index] = true;
 }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
+#include <functional>
 #include <limits>
 #include <span>
 #include <tuple>
@@ -121,6 +122,31 @@ class LoopDetector::Impl {
     memory_.restore_loops([&](std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
       known_loops_.add(step, earlier_step);
     });
+    epoch_ = memory_.epoch();
+  }
+
+  /// Takes in what other robots added to the map. Call it before a frame.
+  void learn() {
+    const MapNews news = memory_.news();
+    for (const auto& [at, content] : news.places) {
+      const auto latest = memory_.latest_step(at.session);
+      const bool is_step =
+          !latest || changes_view(content, quick_similarity(content, content_of(*latest)));
+      new_index_.add(content);
+      memory_.add_new(at, is_step);
+    }
+    const auto with_steps = [this](const MapNews::Loop& loop, const auto& use) {
+      const auto place = find(loop.query);
+      const auto match = find(loop.match);
+      if (place && match) use(step_of(*place), step_of(*match));
+    };
+    for (const MapNews::Loop& loop : news.loops) {
+      with_steps(loop, [this](auto step, auto match) { known_loops_.add(step, match); });
+    }
+    for (const MapNews::Loop& loop : news.rejected) {
+      with_steps(loop, [this](auto step, auto match) { known_loops_.remove(step, match); });
+    }
+    epoch_ = std::max(epoch_, news.epoch);
   }
 
   /// What comes with an image.
@@ -296,7 +322,8 @@ class LoopDetector::Impl {
     Detection detection{.frame = size(),
                         .timestamp_s = given.timestamp_s,
                         .status = Status::unreadable,
-                        .odometry = given.odometry};
+                        .odometry = given.odometry,
+                        .epoch = epoch_};
     add_place(BinaryContent{}, Features{}, detection, cv::Mat());
     return detection;
   }
@@ -435,7 +462,10 @@ class LoopDetector::Impl {
   [[nodiscard]] Detection unanswered(const Given& given) const {
     check_time(given.timestamp_s);
     check(given.odometry);
-    return {.frame = size(), .timestamp_s = given.timestamp_s, .odometry = given.odometry};
+    return {.frame = size(),
+            .timestamp_s = given.timestamp_s,
+            .odometry = given.odometry,
+            .epoch = epoch_};
   }
 
   void check(const std::optional<OdometryPose>& odometry) const {
@@ -552,7 +582,30 @@ class LoopDetector::Impl {
 
   [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const {
     return {place,
-            similarity(content, index_.content(place), options_.retrieval.shift_tolerance_columns)};
+            similarity(content, content_of(place), options_.retrieval.shift_tolerance_columns)};
+  }
+
+  [[nodiscard]] BinaryContent content_of(PlaceId place) const {
+    return place < 0 ? new_index_.content(-1 - place) : index_.content(place);
+  }
+
+  /// The places most similar to a content, best first; of equal ones, those of news() come last.
+  /// `end`: of the others.
+  [[nodiscard]] std::vector<Candidate> find_similar(const BinaryContent& content, PlaceId end,
+                                                    const RetrievalOptions& retrieval,
+                                                    const PlaceTest& is_allowed) const {
+    auto similar = index_.query(content, end, retrieval, is_allowed);
+    if (new_index_.size() == 0) return similar;
+    PlaceTest is_new_allowed;
+    if (is_allowed) is_new_allowed = [&](PlaceId place) { return is_allowed(-1 - place); };
+    for (const auto& [place, value] :
+         new_index_.query(content, new_index_.size(), retrieval, nullptr, is_new_allowed)) {
+      similar.push_back({-1 - place, value});
+    }
+    std::ranges::stable_sort(similar, std::greater{}, &Candidate::similarity);
+    const auto most = static_cast<std::size_t>(retrieval.max_candidates);
+    similar.resize(std::min(most, similar.size()));
+    return similar;
   }
 
   /// The first place of a step.
@@ -580,7 +633,7 @@ class LoopDetector::Impl {
                                         Observation& seen) const {
     RetrievalOptions retrieval = options_.retrieval;
     if (detection.odometry) retrieval.max_candidates *= kLookAlikes;
-    auto similar = index_.query(seen.content, end, retrieval, seen.is_allowed);
+    auto similar = find_similar(seen.content, end, retrieval, seen.is_allowed);
     if (!detection.odometry) return similar;
     keep_in_reach(*detection.odometry, end, seen);
     const auto most = static_cast<std::size_t>(options_.retrieval.max_candidates);
@@ -651,7 +704,8 @@ class LoopDetector::Impl {
               Detection& detection) const {
     const DecisionOptions& decision = options_.decision;
     if (std::ranges::none_of(seen.verified, &VerifiedCandidate::may_match)) {
-      detection.status = end == 0 ? Status::no_earlier_place : Status::no_similar_place;
+      const bool has_places = end > 0 || new_index_.size() > 0;
+      detection.status = has_places ? Status::no_similar_place : Status::no_earlier_place;
     } else if (decision.count_matches) {
       decide_by_matches(seen, detection);
     }
@@ -777,6 +831,8 @@ class LoopDetector::Impl {
   std::optional<CameraModel> camera_;
   PlaceMemory memory_;
   PlaceContents index_;
+  PlaceIndex new_index_;         ///< of place -1 - k at k
+  std::int64_t epoch_ = 0;       ///< see Detection::epoch
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   RecentView recent_view_;
   AttachedParts attached_parts_;
@@ -803,6 +859,7 @@ Detection LoopDetector::process(const cv::Mat& image, std::optional<double> time
 Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s,
                                 const std::optional<OdometryPose>& odometry, Evidence* evidence,
                                 const AllowedPlaces& allowed) {
+  impl_->learn();
   Impl::Observation seen = impl_->observation();
   Detection detection = impl_->detect(image, {timestamp_s, odometry}, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);

@@ -3,6 +3,7 @@
 #include "place_memory.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace loopbit {
@@ -11,6 +12,9 @@ namespace {
 /// Sessions are so many steps apart: no neighbours, whatever a match may move from one step to the
 /// next.
 constexpr int kStepsBetweenSessions = 1000;
+
+/// Sessions that grow have steps below those of earlier ones, with room for 2^32 steps each.
+constexpr std::ptrdiff_t kStepsOfSession = std::ptrdiff_t{1} << 32;
 
 }  // namespace
 
@@ -26,6 +30,7 @@ void PlaceMemory::add_earlier(const SessionFrame& origin, bool is_step) {
 }
 
 std::optional<PlaceId> PlaceMemory::find(const SessionFrame& origin) const {
+  if (const auto found = find_new(origin)) return found;
   const auto key = [](const SessionFrame& at) { return std::pair(at.session, at.frame); };
   const auto found = std::lower_bound(
       earlier_.begin(), earlier_.end(), key(origin),
@@ -34,12 +39,51 @@ std::optional<PlaceId> PlaceMemory::find(const SessionFrame& origin) const {
   return static_cast<PlaceId>(found - earlier_.begin());
 }
 
+std::optional<PlaceId> PlaceMemory::find_new(const SessionFrame& origin) const {
+  const auto session = new_sessions_.find(origin.session);
+  if (session == new_sessions_.end()) return std::nullopt;
+  const std::vector<PlaceId>& places = session->second.places;
+  const auto frame = [this](PlaceId place) { return new_place(place).origin.frame; };
+  const auto found = std::ranges::lower_bound(places, origin.frame, {}, frame);
+  if (found == places.end() || frame(*found) != origin.frame) return std::nullopt;
+  return *found;
+}
+
+std::optional<PlaceId> PlaceMemory::latest_step(int session) const {
+  const auto found = new_sessions_.find(session);
+  if (found == new_sessions_.end()) return std::nullopt;
+  return found->second.steps.back();
+}
+
+void PlaceMemory::add_new(const SessionFrame& origin, bool is_step) {
+  const auto place = static_cast<PlaceId>(-1 - static_cast<std::ptrdiff_t>(new_.size()));
+  const auto [found, is_first] = new_sessions_.try_emplace(origin.session);
+  NewSession& session = found->second;
+  if (is_first) {
+    session.first_step = -kStepsOfSession * (1 + static_cast<std::ptrdiff_t>(new_sessions_.size()));
+    by_first_step_[session.first_step] = &session;
+  }
+  session.places.push_back(place);
+  if (is_step) session.steps.push_back(place);
+  earlier_steps_ += is_step ? 1 : 0;
+  const auto steps = static_cast<std::ptrdiff_t>(session.steps.size());
+  new_.push_back({origin, session.first_step + steps - 1});
+}
+
 std::ptrdiff_t PlaceMemory::step_of(PlaceId place) const {
+  if (place < 0) return new_place(place).step;
   const std::ptrdiff_t step = earlier_[static_cast<std::size_t>(place)].step;
   return step - earlier_.back().step - kStepsBetweenSessions;
 }
 
 std::optional<PlaceId> PlaceMemory::place_of(std::ptrdiff_t step) const {
+  if (step < -kStepsOfSession) {
+    const auto after = by_first_step_.upper_bound(step);
+    if (after == by_first_step_.begin()) return std::nullopt;
+    const auto& [first, session] = *std::prev(after);
+    const auto index = static_cast<std::size_t>(step - first);
+    return index < session->steps.size() ? std::optional(session->steps[index]) : std::nullopt;
+  }
   if (earlier_.empty()) return std::nullopt;
   const std::ptrdiff_t wanted = step + earlier_.back().step + kStepsBetweenSessions;
   const auto found = std::ranges::lower_bound(earlier_, wanted, {}, &EarlierPlace::step);

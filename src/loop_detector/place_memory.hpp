@@ -72,20 +72,33 @@ class PlaceMemory {
     });
   }
 
+  /// The epoch of the places restored.
+  [[nodiscard]] std::int64_t epoch() const { return map_ ? map_->epoch() : 0; }
+
+  /// See MapStorage.
+  [[nodiscard]] MapNews news() const { return map_ ? map_->news() : MapNews{}; }
+
+  /// The place of news() before this one that changed the view in the same session, if there is
+  /// one.
+  [[nodiscard]] std::optional<PlaceId> latest_step(int session) const;
+
+  /// Gives the next negative number to a place of news(). `is_step`: it changed the view.
+  void add_new(const SessionFrame& origin, bool is_step);
+
   /// The first place of this session.
   [[nodiscard]] PlaceId session_begin() const { return static_cast<PlaceId>(earlier_.size()); }
 
-  /// Changes of view in earlier sessions.
+  /// Changes of view in other sessions.
   [[nodiscard]] std::ptrdiff_t earlier_steps() const { return earlier_steps_; }
 
   /// The two below: place < session_begin().
   [[nodiscard]] const SessionFrame& origin(PlaceId place) const {
-    return earlier_[static_cast<std::size_t>(place)].origin;
+    return place < 0 ? new_place(place).origin : earlier_[static_cast<std::size_t>(place)].origin;
   }
   /// Where along the paths of all sessions it lies, counted in changes of view: negative, and far
   /// from any step of another session.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
-  /// The reverse: the first place of a step, if an earlier session has it. Logarithmic.
+  /// The reverse: the first place of a step, if another session has it. Logarithmic.
   [[nodiscard]] std::optional<PlaceId> place_of(std::ptrdiff_t step) const;
 
   /// Throws as MapStorage::add does, and stays as it was.
@@ -107,7 +120,7 @@ class PlaceMemory {
     if (map_) map_->reject(query, match);
   }
 
-  /// The place of an earlier session's frame, if the map still has it.
+  /// The place of another session's frame, if the map still has it.
   [[nodiscard]] std::optional<PlaceId> find(const SessionFrame& origin) const;
 
   /// Valid as long as `held`. Several threads may ask at once.
@@ -119,11 +132,30 @@ class PlaceMemory {
     int step = 0;
   };
 
+  struct NewPlace {
+    SessionFrame origin;
+    std::ptrdiff_t step = 0;
+  };
+
+  /// A session's places of news(), in order of their frames.
+  struct NewSession {
+    std::ptrdiff_t first_step = 0;
+    std::vector<PlaceId> places = {};
+    std::vector<PlaceId> steps = {};  ///< those that changed the view
+  };
+
   void add_earlier(const SessionFrame& origin, bool is_step);
+  [[nodiscard]] const NewPlace& new_place(PlaceId place) const {
+    return new_[static_cast<std::size_t>(-(place + 1))];
+  }
+  [[nodiscard]] std::optional<PlaceId> find_new(const SessionFrame& origin) const;
 
   std::shared_ptr<MapStorage> map_;
   PlaceSearch* search_;  ///< the map's; may be null
   std::vector<EarlierPlace> earlier_;
+  std::vector<NewPlace> new_;  ///< place -1 comes first
+  std::map<int, NewSession> new_sessions_;
+  std::map<std::ptrdiff_t, const NewSession*> by_first_step_;
   std::ptrdiff_t earlier_steps_ = 0;
   std::vector<Features> features_;                              ///< without a map: of each place
   std::map<PlaceId, std::shared_ptr<const Features>> removed_;  ///< those still in view

@@ -41,6 +41,8 @@ class FileDatabase final : public MapDatabase {
   void reconnect() override {}
   void set_time_limit(std::chrono::milliseconds /*limit*/) override {}
   void interrupt() override {}
+  [[nodiscard]] std::int64_t epoch() const override { return 0; }
+  void wait_for_commit(std::chrono::milliseconds /*most*/) override {}
   void hold_back_commits() const override {}  // there is one writer
   void close() override;
 

@@ -2,14 +2,16 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/map_file.hpp"
 
-#include <algorithm>
+#include <array>
 #include <chrono>
 #include <ctime>
 #include <filesystem>
 #include <map>
 #include <new>
 #include <random>
+#include <set>
 #include <tuple>
+#include <unordered_set>
 #include <utility>
 
 #include <fmt/chrono.h>
@@ -24,6 +26,7 @@
 
 #include "batch_writer.hpp"
 #include "file_database.hpp"
+#include "map_follower.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
 #include "searched_places.hpp"
@@ -91,6 +94,7 @@ struct MapReader::Impl {
   Damage damage;
   std::vector<MapSession> sessions;
   std::optional<SearchedPlaces> searched;
+  std::int64_t epoch = 0;  ///< see set_epoch(); 0 = the present one
 };
 
 MapReader::MapReader(const std::string& path, std::size_t cache_mb)
@@ -170,18 +174,54 @@ void MapReader::check_options(const LoopDetectorOptions& options) {
   if (!sessions().empty()) check_detector(impl_->path, this->options(), options);
 }
 
-PlaceSearch* MapReader::place_search() { return impl_->searched ? &*impl_->searched : nullptr; }
+PlaceSearch* MapReader::place_search() {
+  return impl_->searched && impl_->epoch == 0 ? &*impl_->searched : nullptr;
+}
+
+void MapReader::set_epoch(std::int64_t epoch) {
+  const std::int64_t last = impl_->database->epoch();
+  if (epoch > 0 && epoch <= last) {
+    impl_->epoch = epoch;
+    return;
+  }
+  throw Error(ErrorKind::option,
+              last == 0 ? fmt::format("'{}' has no epochs, as a map on a server has; leave the "
+                                      "epoch out.",
+                                      impl_->path)
+                        : fmt::format("The epochs of '{}' are 1 to {}; {} is none of them.",
+                                      impl_->path, last, epoch));
+}
+
+std::int64_t MapReader::epoch() { return impl_->epoch; }
 
 void MapReader::for_each_earlier_place(const Visit& visit) {
   impl_->stored.begin(impl_->path);
+  const auto snapshot = impl_->database->snapshot();
+  if (impl_->epoch == 0) impl_->epoch = impl_->database->epoch();
+  std::unordered_set<std::int64_t> later;
+  if (impl_->epoch > 0) later = new_places(*impl_->database, {.after = impl_->epoch});
   for_each_place([&](const MapPlace& place) {
+    if (later.contains(place.id)) return;
     impl_->stored.add(place.id, place.at);
     visit(place.at, place.content);
   });
 }
 
 void MapReader::for_each_earlier_loop(const VisitLoop& visit) {
-  for (const MapLoop& loop : loops()) visit(loop.query, loop.match);
+  const auto snapshot = impl_->database->snapshot();
+  std::set<std::array<int, 4>> later;
+  const auto pair = [](const MapLoop& loop) {
+    return std::array{loop.query.session, loop.query.frame, loop.match.session, loop.match.frame};
+  };
+  if (impl_->epoch > 0) {
+    for (const MapLoop& loop :
+         read_new_loops(*impl_->database, "loop", {.after = impl_->epoch}, impl_->damage)) {
+      later.insert(pair(loop));
+    }
+  }
+  for (const MapLoop& loop : loops()) {
+    if (!later.contains(pair(loop))) visit(loop.query, loop.match);
+  }
 }
 
 std::shared_ptr<const Features> MapReader::features(PlaceId place) {
@@ -212,6 +252,7 @@ class MapWriter::Impl {
     if (writer_) writer_->flush();
     const bool is_whole = !upload_ || upload_->catch_up(is_stopped);
     if (upload_) end_upload();
+    follower_.reset();
     stored_.reset();
     own_features_.reset();
     own_file_.reset();
@@ -269,6 +310,31 @@ class MapWriter::Impl {
     for (const MapLoop& loop : read_loops(*database_, damage_)) visit(loop.query, loop.match);
     refuse_damaged(path_, damage_.clauses());
     snapshot_.reset();
+  }
+
+  [[nodiscard]] std::int64_t epoch() const { return epoch_; }
+
+  MapNews news() {
+    if (!follower_) return {};
+    MapFollower::News found = follower_->take();
+    for (MapSession& session : found.sessions) {
+      if (writer_) writer_->add_other(session);
+      sessions_[session.session] = std::move(session);
+    }
+    MapNews news{.epoch = found.epoch};
+    for (const MapPlace& place : found.places) {
+      stored().add_new(place.id, place.at);
+      news.places.push_back({place.at, place.content});
+    }
+    const auto take = [this](const std::vector<MapLoop>& loops, std::vector<MapNews::Loop>& to) {
+      for (const MapLoop& loop : loops) {
+        to.push_back({loop.query, loop.match});
+        if (loop.match.session == session_) to.back().match.session = 0;
+      }
+    };
+    take(found.loops, news.loops);
+    take(found.rejected, news.rejected);
+    return news;
   }
 
   std::shared_ptr<const Features> features(PlaceId place) {
@@ -380,11 +446,24 @@ class MapWriter::Impl {
       if (number < session_) begun_.earlier_frames += session.frames;
     }
     if (is_on_server_) {
+      follow(path);
       queue_ = free_path(fmt::format("{}_session_{}_queue.db", map_stem(path), session_));
     } else {
       writer_ = std::make_unique<BatchWriter>(std::move(server_), begun_.session,
                                               begun_.first_place, options_.odometry, encode_image_);
     }
+  }
+
+  /// Begins to learn what others add to what the snapshot has.
+  void follow(const std::string& path) {
+    epoch_ = database_->epoch();
+    std::set<int> known;
+    for (const auto& [number, session] : sessions_) known.insert(number);
+    follower_ = std::make_unique<MapFollower>(
+        open_map(path, MapDatabase::Access::read), session_, epoch_, std::move(known),
+        [path = path_, options = options_](const MapSession& session) {
+          check_same_shape(path, session.options, options);
+        });
   }
 
   /// Of a map on a server, the file that queues its rows is made by the first call.
@@ -488,6 +567,8 @@ class MapWriter::Impl {
   Damage damage_;
 
   // Of a map on a server.
+  std::int64_t epoch_ = 0;  ///< of the snapshot
+  std::unique_ptr<MapFollower> follower_;
   std::string queue_;                      ///< the file; empty when the server has all of it
   std::unique_ptr<MapDatabase> own_file_;  ///< the same, for reading
   std::optional<FeatureReader> own_features_;
@@ -544,6 +625,10 @@ void MapWriter::for_each_earlier_place(const Visit& visit) { impl().for_each_ear
 void MapWriter::for_each_earlier_loop(const VisitLoop& visit) {
   impl().for_each_earlier_loop(visit);
 }
+
+std::int64_t MapWriter::epoch() { return impl().epoch(); }
+
+MapNews MapWriter::news() { return impl().news(); }
 
 std::shared_ptr<const Features> MapWriter::features(PlaceId place) {
   return impl().features(place);

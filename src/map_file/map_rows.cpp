@@ -307,33 +307,72 @@ SessionFrame session_frame(const SqlStatement& row, int column) {
   return {narrow(row.integer(column)), narrow(row.integer(column + 1))};
 }
 
+/// The columns of `loop` or `rejected` that loop_in() reads.
+std::string loop_columns(const std::string& table) {
+  return table +
+         ", session, frame, match_session, match_frame, score, similarity, matches, inliers, "
+         "checksum";
+}
+
+using LoopChecksum = Checksum (*)(const MapLoop&);
+
+/// None, with a clause in `damage`, if it is damaged.
+std::optional<MapLoop> loop_in(const SqlStatement& row, const std::string& table, std::int64_t key,
+                               LoopChecksum checksum, Damage& damage) {
+  const MapLoop loop{.query = session_frame(row, 1),
+                     .match = session_frame(row, 3),
+                     .score = row.real(5),
+                     .similarity = row.real(6),
+                     .matches = narrow(row.integer(7)),
+                     .inliers = narrow(row.integer(8))};
+  const bool is_finite = std::isfinite(loop.score) && std::isfinite(loop.similarity);
+  if (is_finite && has_checksum(row, 9, checksum(loop))) return loop;
+  damage.add(fmt::format("{} {}: its values differ from their checksum", table, key));
+  return std::nullopt;
+}
+
 /// The rows of `loop` or `rejected`.
 std::vector<MapLoop> read_loops_of(const MapDatabase& database, const std::string& table,
-                                   Checksum (*checksum)(const MapLoop&), Damage& damage,
-                                   const KeyRange& keys) {
+                                   LoopChecksum checksum, Damage& damage, const KeyRange& keys) {
   std::vector<MapLoop> loops;
   for_each_row(
-      database, table,
-      table +
-          ", session, frame, match_session, match_frame, score, similarity, matches, "
-          "inliers, checksum",
-      damage,
+      database, table, loop_columns(table), damage,
       [&](const SqlStatement& row, std::int64_t key) {
-        const MapLoop loop{.query = session_frame(row, 1),
-                           .match = session_frame(row, 3),
-                           .score = row.real(5),
-                           .similarity = row.real(6),
-                           .matches = narrow(row.integer(7)),
-                           .inliers = narrow(row.integer(8))};
-        const bool is_finite = std::isfinite(loop.score) && std::isfinite(loop.similarity);
-        if (is_finite && has_checksum(row, 9, checksum(loop))) {
-          loops.push_back(loop);
-        } else {
-          damage.add(fmt::format("{} {}: its values differ from their checksum", table, key));
-        }
+        const auto loop = loop_in(row, table, key, checksum, damage);
+        if (loop) loops.push_back(*loop);
       },
       keys);
   return loops;
+}
+
+constexpr const char* kPlaceColumns = "place, session, frame, timestamp, content, checksum";
+
+/// Of kPlaceColumns. False, with a clause in `damage`, if it is damaged.
+bool read_place(const SqlStatement& row, std::int64_t key, MapPlace& place, Damage& damage) {
+  place.id = key;
+  place.at = session_frame(row, 1);
+  place.timestamp_s.reset();
+  if (!row.is_null(3)) place.timestamp_s = row.real(3);
+  const bool is_finite = std::isfinite(place.timestamp_s.value_or(0.0));
+  if (is_finite && read_content(row.bytes(4), place.content) &&
+      has_checksum(row, 5, checksum_of(place))) {
+    return true;
+  }
+  damage.add(fmt::format("place {}: its content differs from its checksum", key));
+  return false;
+}
+
+/// Calls visit(row, key) for each row of these commits. The key is the first of `columns`.
+template <typename Visit>
+void for_each_new_row(const MapDatabase& database, const std::string& table,
+                      const std::string& columns, const EpochRange& epochs, const Visit& visit) {
+  const auto row = database.prepare(
+      fmt::format("SELECT {0} FROM {1} JOIN batch USING (batch) WHERE epoch > ?1 AND epoch <= ?2 "
+                  "ORDER BY epoch, {1}",
+                  columns, table));
+  row->bind(1, epochs.after);
+  row->bind(2, epochs.last);
+  while (row->step()) visit(*row, row->integer(0));
 }
 
 /// `table`: loop or rejected.
@@ -386,11 +425,13 @@ void refuse_damaged(const std::string& path, const std::vector<std::string>& cla
                   path, clauses.front(), more > 0 ? fmt::format(", and {} more", more) : ""));
 }
 
-std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damage) {
+std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damage,
+                                      const KeyRange& keys) {
   std::vector<MapSession> sessions;
   for_each_row(
       database, "session", "session, uid, name, started, loopbit, options, frames, checksum",
-      damage, [&](const SqlStatement& row, std::int64_t key) {
+      damage,
+      [&](const SqlStatement& row, std::int64_t key) {
         MapSession session{.session = narrow(key),
                            .uid = row.text(1),
                            .name = row.text(2),
@@ -403,7 +444,8 @@ std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damag
         } else {
           damage.add(fmt::format("session {}: its description differs from its checksum", key));
         }
-      });
+      },
+      keys);
   mark_linked(database, sessions, damage);
   return sessions;
 }
@@ -412,21 +454,40 @@ void for_each_place(const MapDatabase& database, const std::function<void(const 
                     Damage& damage, const KeyRange& keys) {
   MapPlace place;
   for_each_row(
-      database, "place", "place, session, frame, timestamp, content, checksum", damage,
+      database, "place", kPlaceColumns, damage,
       [&](const SqlStatement& row, std::int64_t key) {
-        place.id = key;
-        place.at = session_frame(row, 1);
-        place.timestamp_s.reset();
-        if (!row.is_null(3)) place.timestamp_s = row.real(3);
-        const bool is_finite = std::isfinite(place.timestamp_s.value_or(0.0));
-        if (is_finite && read_content(row.bytes(4), place.content) &&
-            has_checksum(row, 5, checksum_of(place))) {
-          visit(place);
-        } else {
-          damage.add(fmt::format("place {}: its content differs from its checksum", key));
-        }
+        if (read_place(row, key, place, damage)) visit(place);
       },
       keys);
+}
+
+void for_each_new_place(const MapDatabase& database, const EpochRange& epochs,
+                        const std::function<void(const MapPlace&)>& visit, Damage& damage) {
+  MapPlace place;
+  for_each_new_row(database, "place", kPlaceColumns, epochs,
+                   [&](const SqlStatement& row, std::int64_t key) {
+                     if (read_place(row, key, place, damage)) visit(place);
+                   });
+}
+
+std::unordered_set<std::int64_t> new_places(const MapDatabase& database, const EpochRange& epochs) {
+  std::unordered_set<std::int64_t> places;
+  for_each_new_row(database, "place", "place", epochs,
+                   [&](const SqlStatement& /*row*/, std::int64_t key) { places.insert(key); });
+  return places;
+}
+
+std::vector<MapLoop> read_new_loops(const MapDatabase& database, const std::string& table,
+                                    const EpochRange& epochs, Damage& damage) {
+  LoopChecksum checksum = checksum_of_rejected;
+  if (table == "loop") checksum = [](const MapLoop& loop) { return checksum_of(loop); };
+  std::vector<MapLoop> loops;
+  for_each_new_row(database, table, loop_columns(table), epochs,
+                   [&](const SqlStatement& row, std::int64_t key) {
+                     const auto loop = loop_in(row, table, key, checksum, damage);
+                     if (loop) loops.push_back(*loop);
+                   });
+  return loops;
 }
 
 std::vector<MapLoop> read_loops(const MapDatabase& database, Damage& damage, const KeyRange& keys) {

@@ -47,7 +47,8 @@ struct KeyRange {
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);
 
 /// Of an older map, no session but the first is linked.
-std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damage);
+std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damage,
+                                      const KeyRange& keys = {});
 
 /// In order of id.
 void for_each_place(const MapDatabase& database, const std::function<void(const MapPlace&)>& visit,
@@ -69,6 +70,23 @@ std::vector<MapOdometry> read_odometry(const MapDatabase& database, Damage& dama
 /// In the order in which they were measured.
 std::vector<MapLoopPose> read_loop_poses(const MapDatabase& database, Damage& damage,
                                          const KeyRange& keys = {});
+
+/// Commits to a map on a server: after the first, up to the last.
+struct EpochRange {
+  std::int64_t after = 0;
+  std::int64_t last = std::numeric_limits<std::int64_t>::max();
+};
+
+/// Of the rows of these commits that are still there. In order of epoch and key.
+void for_each_new_place(const MapDatabase& database, const EpochRange& epochs,
+                        const std::function<void(const MapPlace&)>& visit, Damage& damage);
+
+/// Of these commits.
+std::unordered_set<std::int64_t> new_places(const MapDatabase& database, const EpochRange& epochs);
+
+/// `table`: loop or rejected.
+std::vector<MapLoop> read_new_loops(const MapDatabase& database, const std::string& table,
+                                    const EpochRange& epochs, Damage& damage);
 
 /// What a map has of a session, so that nothing is copied to it twice.
 struct KnownRows {

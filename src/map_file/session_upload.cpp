@@ -10,14 +10,11 @@
 
 #include "file_database.hpp"
 #include "map_rows.hpp"
+#include "server_limits.hpp"
 
 namespace loopbit {
 namespace {
 
-constexpr std::chrono::milliseconds kFirstPause{100};
-constexpr std::chrono::milliseconds kMaxPause{5000};
-/// An answer to a few kilobytes that takes longer does not come.
-constexpr std::chrono::milliseconds kMaxAnswer{10000};
 /// Whoever stops a run waits no longer for a server that answers.
 constexpr std::chrono::seconds kMaxFarewell{2};
 constexpr std::chrono::milliseconds kLookForStop{20};

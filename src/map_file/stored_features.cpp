@@ -50,7 +50,7 @@ void StoredFeatures::begin(const std::string& path) {
 std::shared_ptr<const Features> StoredFeatures::get(PlaceId place, Damage& damage,
                                                     FeatureReader& reader) {
   if (auto cached = cache_.find(place)) return cached;
-  const StoredPlace& stored = places_.at(static_cast<std::size_t>(place));
+  const StoredPlace& stored = this->stored(place);
   if (stored.id == kNoRow) return std::make_shared<const Features>();
   auto read = reader.read(stored.id, stored.at, damage);
   auto features = std::make_shared<const Features>(read ? std::move(*read) : Features{});

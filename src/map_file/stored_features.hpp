@@ -65,10 +65,11 @@ class StoredFeatures {
   /// Gives the next number to the row `id`, which is place `at`.
   void add(std::int64_t id, const SessionFrame& at) { places_.push_back({id, at}); }
 
+  /// Gives the next negative number, from -1 on, to a row that others added.
+  void add_new(std::int64_t id, const SessionFrame& at) { new_places_.push_back({id, at}); }
+
   /// Forgets the row of a place, and returns it.
-  std::int64_t remove(PlaceId place) {
-    return std::exchange(places_.at(static_cast<std::size_t>(place)).id, kNoRow);
-  }
+  std::int64_t remove(PlaceId place) { return std::exchange(stored(place).id, kNoRow); }
 
   [[nodiscard]] PlaceId size() const { return static_cast<PlaceId>(places_.size()); }
 
@@ -92,10 +93,16 @@ class StoredFeatures {
     SessionFrame at;
   };
 
+  [[nodiscard]] StoredPlace& stored(PlaceId place) {
+    return place < 0 ? new_places_.at(static_cast<std::size_t>(-(place + 1)))
+                     : places_.at(static_cast<std::size_t>(place));
+  }
+
   bool has_begun_ = false;
   FeatureReader reader_;
   FeatureCache cache_;
   std::vector<StoredPlace> places_;
+  std::vector<StoredPlace> new_places_;  ///< place -1 comes first
 };
 
 }  // namespace loopbit

@@ -24,10 +24,10 @@ namespace fs = std::filesystem;
 /// Last those that tell a run from a data set, so that a run half removed is still one.
 std::vector<std::string> files_of_a_run() {
   std::vector<std::string> names{
-      kTruthFile,       kNotFalseFile,   kIgnoreFile,    kUnknownFile,
-      kPositionsFile,   kPosesFile,      kPoseGraphFile, kMatchedPosesFile,
-      kCameraFile,      kTrajectoryFile, kCorrectedFile, kCorrectedKittiFile,
-      kJudgedLoopsFile, kGraphFile,      kLateLoopsFile, kReportFile};
+      kTruthFile,     kNotFalseFile,       kIgnoreFile,       kUnknownFile, kPositionsFile,
+      kPosesFile,     kPoseGraphFile,      kMatchedPosesFile, kCameraFile,  kTrajectoryFile,
+      kCorrectedFile, kCorrectedKittiFile, kJudgedLoopsFile,  kGraphFile,   kLateLoopsFile,
+      kReportFile,    kEpochsFile};
   for (const char* suffix : kDatabaseSuffixes) {
     names.push_back(std::string(kEvidenceFile) + suffix);
   }

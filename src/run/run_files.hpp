@@ -15,6 +15,7 @@ namespace loopbit {
 // The files of a run folder.
 inline constexpr const char* kLoopsFile = "loops.csv";
 inline constexpr const char* kLateLoopsFile = "late_loops.csv";
+inline constexpr const char* kEpochsFile = "epochs.csv";
 inline constexpr const char* kRecordFile = "run.json";
 inline constexpr const char* kEvidenceFile = "evidence.db";
 inline constexpr const char* kTruthFile = "truth.csv";

@@ -193,7 +193,16 @@ RunFolder::RunFolder(const std::string& path, bool overwrite,
       loops_(std::make_unique<Rows>(path, kLoopsFile, kLoopsHeader)),
       late_loops_(std::make_unique<Rows>(path, kLateLoopsFile, kLateLoopsHeader)) {}
 
+/// A row of epochs.csv, if the answer is as of another epoch than the one before.
+void RunFolder::add_epoch(const Detection& detection) {
+  const std::int64_t before = detections_.empty() ? 0 : detections_.back().epoch;
+  if (detection.epoch == before) return;
+  if (!epochs_) epochs_ = std::make_unique<Rows>(path_, kEpochsFile, kEpochsHeader);
+  epochs_->append(fmt::format("{},{}\n", detection.frame, detection.epoch), detections_.size());
+}
+
 void RunFolder::add(const Detection& detection) {
+  add_epoch(detection);
   loops_->append(csv_row(detection, detections_), detections_.size());
   detections_.push_back(detection);
   earlier_->leave_aside();

@@ -60,10 +60,13 @@ class RunFolder {
  private:
   class Rows;
 
+  void add_epoch(const Detection& detection);
+
   std::string path_;
   std::unique_ptr<EarlierRun> earlier_;
   std::unique_ptr<Rows> loops_;
   std::unique_ptr<Rows> late_loops_;
+  std::unique_ptr<Rows> epochs_;  ///< null without a map on a server
   std::size_t late_rows_ = 0;
   std::vector<Detection> detections_;
 };
@@ -73,6 +76,9 @@ inline constexpr const char* kLoopsHeader =
     "frame,timestamp,status,match,score,similarity,matches,inliers,"
     "votes,geometry,path,rivals,prior,name,match_name,"
     "content_ms,retrieval_ms,features_ms,verification_ms";
+
+/// The header of epochs.csv, without a line end.
+inline constexpr const char* kEpochsHeader = "frame,epoch";
 
 /// The header of late_loops.csv, without a line end, and its kinds.
 inline constexpr const char* kLateLoopsHeader =

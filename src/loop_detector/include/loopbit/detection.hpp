@@ -93,6 +93,9 @@ struct Detection {
   std::vector<LateLoop> withdrawn_loops = {};
   std::optional<OdometryPose> odometry = std::nullopt;  ///< what process() was given
   std::string name = {};  ///< of the image in its source; run() sets it
+  /// Of a map on a server: all that was committed up to this epoch, and nothing later, was known of
+  /// it, but for this session. 0 = no such map.
+  std::int64_t epoch = 0;
 };
 
 /// A candidate place for an image, with the numbers behind it; see LoopDetector::query.

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -48,9 +49,26 @@ class PlaceSearch {
   virtual BinaryContent content(PlaceId place) = 0;
 };
 
+/// What others added to a map while a session was being added. Session 0 is that session.
+struct MapNews {
+  struct Place {
+    SessionFrame at;
+    BinaryContent content;
+  };
+  struct Loop {
+    SessionFrame query;
+    SessionFrame match;
+  };
+
+  std::int64_t epoch = 0;  ///< see Detection::epoch
+  std::vector<Place> places = {};
+  std::vector<Loop> loops = {};
+  std::vector<Loop> rejected = {};
+};
+
 /// What a LoopDetector needs from a map that outlives it; map_file.hpp has the one on disk. Places
 /// are numbered from 0: first those of earlier sessions, by session and frame, then each frame that
-/// is added. Not thread-safe.
+/// is added. Those of news() are numbered -1, -2, and so on. Not thread-safe.
 class MapStorage {
  public:
   using Visit = std::function<void(const SessionFrame&, const BinaryContent&)>;
@@ -76,6 +94,13 @@ class MapStorage {
   /// Calls `visit` for each loop of earlier sessions that was not rejected, in the order in which
   /// they were found.
   virtual void for_each_earlier_loop(const VisitLoop& visit) = 0;
+
+  /// The epoch of what the two functions above visit; 0 if the map has none.
+  [[nodiscard]] virtual std::int64_t epoch() { return 0; }
+
+  /// What others added since the last call, or since what was visited: whole commits, in their
+  /// order. Asked before each frame, so it should not wait.
+  virtual MapNews news() { return {}; }
 
   /// The features of a place; empty if they are lost. Never null.
   virtual std::shared_ptr<const Features> features(PlaceId place) = 0;

@@ -112,6 +112,13 @@ class MapDatabase {
   /// Whatever waits for a server, now or later, ends at once with an Error. For any thread.
   virtual void interrupt() = 0;
 
+  /// The number of the latest commit, in the order of all; 0 if they have none.
+  [[nodiscard]] virtual std::int64_t epoch() const = 0;
+
+  /// Waits until anyone has committed something since the last call, but no longer than `most`. The
+  /// first call returns at once.
+  virtual void wait_for_commit(std::chrono::milliseconds most) = 0;
+
   /// Until the transaction ends, no other one is committed.
   virtual void hold_back_commits() const = 0;
 

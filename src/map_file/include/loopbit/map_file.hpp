@@ -149,7 +149,13 @@ class MapReader : public MapStorage {
   /// Of a map on a server, the address without passwords.
   [[nodiscard]] const std::string& path() const;
 
+  /// From now on, a LoopDetector of this map sees what was committed up to this epoch, without what
+  /// was removed or rejected since then. Throws Error (kind option) if the map is not on a server
+  /// or has not come so far.
+  void set_epoch(std::int64_t epoch);
+
   void check_options(const LoopDetectorOptions& options) override;
+  std::int64_t epoch() override;
   /// A reader serves the queries of one LoopDetector. A second one, add(), remove() and reject()
   /// throw Error (kind option).
   /// Of a map on a server that has the extension and its index. Without it, and of a file, null.
@@ -246,6 +252,8 @@ class MapWriter : public MapStorage {
   /// continued.
   void for_each_earlier_place(const Visit& visit) override;
   void for_each_earlier_loop(const VisitLoop& visit) override;
+  std::int64_t epoch() override;
+  MapNews news() override;
   /// Empty if they are damaged. The session continues, and damage() lists them.
   std::shared_ptr<const Features> features(PlaceId place) override;
   void add(const Detection& detection, const BinaryContent& content,

@@ -1,0 +1,136 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "map_follower.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <iterator>
+#include <utility>
+
+#include "loopbit/error.hpp"
+
+#include "server_limits.hpp"
+
+namespace loopbit {
+namespace {
+
+/// A notification that was lost costs so much.
+constexpr std::chrono::milliseconds kMaxSilence{1000};
+/// Commits that are read at once; most have a few frames.
+constexpr std::int64_t kEpochsAtOnce = 64;
+/// 37 MB of contents. A caller that takes nothing gets no more.
+constexpr std::size_t kMaxPlaces = 65536;
+
+template <typename Row>
+void append(std::vector<Row>& rows, std::vector<Row>&& more) {
+  rows.insert(rows.end(), std::move_iterator(more.begin()), std::move_iterator(more.end()));
+}
+
+}  // namespace
+
+MapFollower::MapFollower(std::unique_ptr<MapDatabase> database, int session, std::int64_t epoch,
+                         std::set<int> known, std::function<void(const MapSession&)> check)
+    : database_(std::move(database)),
+      session_(session),
+      known_(std::move(known)),
+      check_(std::move(check)),
+      epoch_(epoch) {
+  database_->set_time_limit(kMaxAnswer);
+  news_.epoch = epoch;
+  thread_ = std::thread([this] { run(); });
+}
+
+MapFollower::~MapFollower() {
+  {
+    const std::lock_guard lock(mutex_);
+    stop_ = true;
+  }
+  database_->interrupt();
+  changed_.notify_all();
+  thread_.join();
+}
+
+MapFollower::News MapFollower::take() {
+  const std::lock_guard lock(mutex_);
+  changed_.notify_all();
+  return std::exchange(news_, {.epoch = news_.epoch});
+}
+
+bool MapFollower::has_stopped() const {
+  const std::lock_guard lock(mutex_);
+  return stop_;
+}
+
+void MapFollower::run() {
+  auto pause = kFirstPause;
+  while (!has_stopped()) {
+    try {
+      if (database_->is_lost()) database_->reconnect();
+      follow();
+      pause = kFirstPause;
+    } catch (const Error&) {  // the upload says so
+      std::unique_lock lock(mutex_);
+      changed_.wait_for(lock, pause, [this] { return stop_; });
+      pause = std::min(2 * pause, kMaxPause);
+    }
+  }
+}
+
+/// Once. Throws Error if the server is lost.
+void MapFollower::follow() {
+  database_->wait_for_commit(kMaxSilence);
+  const std::int64_t last = database_->epoch();
+  while (epoch_ < last) {
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return stop_ || news_.places.size() < kMaxPlaces; });
+      if (stop_) return;
+    }
+    read(std::min(last, epoch_ + kEpochsAtOnce));
+  }
+}
+
+/// What was committed up to `epoch`.
+void MapFollower::read(std::int64_t epoch) {
+  const EpochRange epochs{epoch_, epoch};
+  News news{.epoch = epoch};
+  for_each_new_place(
+      *database_, epochs,
+      [&](const MapPlace& place) {
+        if (is_of_use(place.at.session, news)) news.places.push_back(place);
+      },
+      damage_);
+  const auto by_others = [this](std::vector<MapLoop> loops) {
+    std::erase_if(loops, [this](const MapLoop& loop) { return loop.query.session == session_; });
+    return loops;
+  };
+  news.loops = by_others(read_new_loops(*database_, "loop", epochs, damage_));
+  news.rejected = by_others(read_new_loops(*database_, "rejected", epochs, damage_));
+  epoch_ = epoch;
+  const std::lock_guard lock(mutex_);
+  news_.epoch = epoch;
+  append(news_.sessions, std::move(news.sessions));
+  append(news_.places, std::move(news.places));
+  append(news_.loops, std::move(news.loops));
+  append(news_.rejected, std::move(news.rejected));
+}
+
+/// Adds a session that was not known to `news`.
+bool MapFollower::is_of_use(int session, News& news) {
+  if (session == session_ || ignored_.contains(session)) return false;
+  if (known_.contains(session)) return true;
+  for (const MapSession& found : read_sessions(*database_, damage_, {session, session})) {
+    try {
+      check_(found);
+    } catch (const Error&) {
+      break;
+    }
+    news.sessions.push_back(found);
+    known_.insert(session);
+    return true;
+  }
+  ignored_.insert(session);
+  return false;
+}
+
+}  // namespace loopbit
