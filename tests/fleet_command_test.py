@@ -418,12 +418,13 @@ class FleetTest(CommandTest):
         self.assertGreaterEqual(uses(), before + len(images))
         self.assertTrue(QUICK or any(json.loads(line)["status"] == "loop" for line in of_file))
 
-    def test_a_newer_version_is_refused(self):
-        self.server.sql("town", "INSERT INTO loopbit.migration (version) VALUES (99)")
-        try:
-            self.assert_fails(loopbit("map", "info", self.town), 3, "version 99", "newer loopbit")
-        finally:
-            self.server.sql("town", "DELETE FROM loopbit.migration WHERE version = 99")
+    def test_another_version_is_refused(self):
+        for version, remedy in (99, "newer loopbit"), (1, "'loopbit map merge COPY.db ADDRESS'"):
+            self.server.sql("town", f"UPDATE loopbit.migration SET version = {version}")
+            try:
+                self.assert_fails(loopbit("map", "info", self.town), 3, f"version {version}", remedy)
+            finally:
+                self.server.sql("town", "UPDATE loopbit.migration SET version = 2")
 
     def as_robot2(self, statement):
         return subprocess.run(["psql", "-X", "-q", "-A", "-t", "-c", statement,

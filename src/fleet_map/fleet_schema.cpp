@@ -192,10 +192,12 @@ void check_version(const Connection& connection) {
                                   connection.shown()));
   }
   const std::int64_t version = connection.integer("SELECT max(version) FROM loopbit.migration");
-  if (version >= 1 && version <= kFleetVersion) return;
+  if (version == kFleetVersion) return;
   connection.refuse(fmt::format(
-      "has a map of version {}, but this loopbit knows versions up to {}; use a newer loopbit",
-      version, kFleetVersion));
+      "has a map of version {}, but this loopbit knows version {}; {}", version, kFleetVersion,
+      version > kFleetVersion ? "use a newer loopbit"
+                              : "save it with the loopbit that made it, by 'loopbit map merge "
+                                "COPY.db ADDRESS', and merge the copy into a new database"));
 }
 
 }  // namespace loopbit

@@ -7,7 +7,7 @@
 namespace loopbit {
 
 /// The version of the tables on a server. All are those of map files of version 4.
-inline constexpr int kFleetVersion = 1;
+inline constexpr int kFleetVersion = 2;
 
 /// Makes the tables and roles in the current transaction.
 void create_tables(const Connection& connection);
@@ -15,7 +15,7 @@ void create_tables(const Connection& connection);
 /// Whether the database has tables of a map, of whatever version.
 bool has_tables(const Connection& connection);
 
-/// Throws Error (kind input) if there are none, or if they are of a newer version.
+/// Throws Error (kind input) if there are none, or if they are of another version.
 void check_version(const Connection& connection);
 
 }  // namespace loopbit
