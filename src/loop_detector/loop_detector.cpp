@@ -118,11 +118,7 @@ class LoopDetector::Impl {
         workspaces_([this] { return make_workspace(); }) {
     validate(options);
     memory_.check_options(options);
-    restore_places();
-    memory_.restore_loops([&](std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
-      known_loops_.add(step, earlier_step);
-    });
-    epoch_ = memory_.epoch();
+    restore();
   }
 
   /// Takes in what other robots added to the map. Call it before a frame.
@@ -398,6 +394,14 @@ class LoopDetector::Impl {
   [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
 
  private:
+  void restore() {
+    restore_places();
+    memory_.restore_loops([&](std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
+      known_loops_.add(step, earlier_step);
+    });
+    epoch_ = memory_.epoch();
+  }
+
   void restore_places() {
     if (memory_.is_searched()) return memory_.restore_searched(kUnmovedSimilarity);
     PlaceId latest_step = 0;

@@ -12,7 +12,7 @@ namespace loopbit {
 namespace {
 
 /// 50 bytes each.
-constexpr int kRowsAtOnce = 16'384;
+constexpr int kFetchedAtOnce = 16'384;
 
 std::span<const unsigned char> bytes_of(const BinaryContent& content) {
   return {reinterpret_cast<const unsigned char*>(content.rows.data()), sizeof content.rows};
@@ -33,7 +33,7 @@ void SearchedPlaces::for_each_place(double unmoved, const Visit& visit) {
           "timestamp, content::binary_content)) OVER (ORDER BY place) FROM place WHERE place > 0",
           unmoved))
       ->step();
-  const auto rows = database_.prepare(fmt::format("FETCH {} FROM searched_places", kRowsAtOnce));
+  const auto rows = database_.prepare(fmt::format("FETCH {} FROM searched_places", kFetchedAtOnce));
   for (;;) {
     rows->reset();
     int number = 0;
@@ -48,7 +48,7 @@ void SearchedPlaces::for_each_place(double unmoved, const Visit& visit) {
       stored_.add(key, at);
       visit(at, rows->integer(3) != 0);
     }
-    if (number < kRowsAtOnce) break;
+    if (number < kFetchedAtOnce) break;
   }
   snapshot->end();
 }
