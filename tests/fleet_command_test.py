@@ -80,7 +80,8 @@ class FleetTest(CommandTest):
     def lines(self, *arguments):
         ran = loopbit(*arguments)
         self.assertEqual(ran.returncode, 0, ran.stderr)
-        self.assertEqual(ran.stderr, "")
+        # A slow machine tells how far it is.
+        self.assertEqual([line for line in ran.stderr.splitlines() if " frames/s, " not in line], [])
         return ran.stdout.splitlines()
 
     def test_program(self):
