@@ -11,7 +11,7 @@ namespace loopbit {
 namespace {
 
 /// A robot follows an earlier path for a hundred changes of view on average, and is somewhere new
-/// for as long in between. Ten times more or less changes little.
+/// for as long in between. Where frames say little, such as by night, this limits the score.
 constexpr double kLeave = 0.01;
 constexpr double kReturn = 0.01;
 /// A path is followed at 0, 1 or 2 steps per step, most likely at the speed of before.
