@@ -304,7 +304,7 @@ class FleetTest(CommandTest):
             run.send_signal(signal.SIGINT)
             begin = time.monotonic()
             _, stderr = run.communicate()
-            self.assertLess(time.monotonic() - begin, 8)
+            self.assertLess(time.monotonic() - begin, 30 if QUICK else 8)    # an answer is awaited for 10 s
         self.assertEqual(run.returncode, 130, stderr)
         self.assertIn("brings them there", stderr)
         frames = len(decisions(out))
@@ -413,7 +413,7 @@ class FleetTest(CommandTest):
         ran = loopbit("query", viewer, *images, "--json", "--places", "30",
                       environment={"PGOPTIONS": "-c enable_seqscan=off"})
         self.assertEqual((ran.returncode, ran.stderr, ran.stdout.splitlines()), (0, "", of_file))
-        deadline = time.monotonic() + 10
+        deadline = time.monotonic() + 60
         while uses() < before + len(images) and time.monotonic() < deadline:
             time.sleep(0.1)    # statistics come late
         self.assertGreaterEqual(uses(), before + len(images))

@@ -157,7 +157,7 @@ TEST_F(FleetMap, ARobotLearnsWhatOthersAddMeanwhile) {
   MapWriter other(address, fast_options(), "other");
   MapNews all;
   const auto learn_until = [&](std::int64_t epoch) {
-    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
     while (all.epoch < epoch && std::chrono::steady_clock::now() < end) {
       const MapNews news = me.news();
       all.epoch = news.epoch;
