@@ -197,9 +197,12 @@ std::int64_t MapReader::epoch() { return impl_->epoch; }
 void MapReader::for_each_earlier_place(const Visit& visit) {
   impl_->stored.begin(impl_->path);
   const auto snapshot = impl_->database->snapshot();
-  if (impl_->epoch == 0) impl_->epoch = impl_->database->epoch();
   std::unordered_set<std::int64_t> later;
-  if (impl_->epoch > 0) later = new_places(*impl_->database, {.after = impl_->epoch});
+  if (impl_->epoch == 0) {
+    impl_->epoch = impl_->database->epoch();
+  } else {
+    later = new_places(*impl_->database, {.after = impl_->epoch});
+  }
   for_each_place([&](const MapPlace& place) {
     if (later.contains(place.id)) return;
     impl_->stored.add(place.id, place.at);

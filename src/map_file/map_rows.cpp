@@ -90,18 +90,6 @@ Checksum& Checksum::add(double value) {
   return add(std::bit_cast<std::array<unsigned char, sizeof stored>>(stored));
 }
 
-/// The 512 bytes of `content`, valid as long as it is: 64 rows of 64 bits.
-std::span<const unsigned char> content_bytes(const BinaryContent& content) {
-  return {reinterpret_cast<const unsigned char*>(content.rows.data()), sizeof content.rows};
-}
-
-/// False, and `content` unchanged, unless there are 512 bytes.
-bool read_content(std::span<const unsigned char> bytes, BinaryContent& content) {
-  if (bytes.size() != sizeof content.rows) return false;
-  std::memcpy(content.rows.data(), bytes.data(), bytes.size());
-  return true;
-}
-
 /// 16 bytes, plus 80 bytes per feature.
 std::vector<unsigned char> features_bytes(const Features& features) {
   const std::size_t size = features.keypoints.size();
@@ -414,6 +402,16 @@ void mark_linked(const MapDatabase& database, std::vector<MapSession>& sessions,
 }
 
 }  // namespace
+
+std::span<const unsigned char> content_bytes(const BinaryContent& content) {
+  return {reinterpret_cast<const unsigned char*>(content.rows.data()), sizeof content.rows};
+}
+
+bool read_content(std::span<const unsigned char> bytes, BinaryContent& content) {
+  if (bytes.size() != sizeof content.rows) return false;
+  std::memcpy(content.rows.data(), bytes.data(), bytes.size());
+  return true;
+}
 
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses) {
   if (clauses.empty()) return;

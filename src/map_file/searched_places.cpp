@@ -3,8 +3,6 @@
 #include "searched_places.hpp"
 
 #include <algorithm>
-#include <cstring>
-#include <span>
 
 #include <fmt/format.h>
 
@@ -13,10 +11,6 @@ namespace {
 
 /// 50 bytes each.
 constexpr int kFetchedAtOnce = 16'384;
-
-std::span<const unsigned char> bytes_of(const BinaryContent& content) {
-  return {reinterpret_cast<const unsigned char*>(content.rows.data()), sizeof content.rows};
-}
 
 }  // namespace
 
@@ -63,7 +57,7 @@ PlaceSearch::Similar SearchedPlaces::most_similar(const BinaryContent& content,
   }
   SqlStatement& rows = *most_similar_;
   rows.reset();
-  rows.bind(1, bytes_of(content));
+  rows.bind(1, content_bytes(content));
   rows.bind(2, std::int64_t{shift_tolerance_columns});
   rows.bind(3, static_cast<std::int64_t>(number));
   Similar similar;
@@ -85,11 +79,7 @@ BinaryContent SearchedPlaces::content(PlaceId place) {
   content_->reset();
   content_->bind(1, keys_.at(static_cast<std::size_t>(place)));
   BinaryContent content;
-  if (!content_->step()) return content;  // it was removed since
-  const auto bytes = content_->bytes(0);
-  if (bytes.size() == sizeof content.rows) {
-    std::memcpy(content.rows.data(), bytes.data(), bytes.size());
-  }
+  if (content_->step()) read_content(content_->bytes(0), content);  // or it was removed since
   return content;
 }
 

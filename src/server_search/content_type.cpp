@@ -130,18 +130,11 @@ Datum loopbit_content_in(PG_FUNCTION_ARGS) {
 
 PG_FUNCTION_INFO_V1(loopbit_content_out);
 Datum loopbit_content_out(PG_FUNCTION_ARGS) {
-  const char* content = PG_GETARG_POINTER(0);
-  constexpr char kDigits[] = "0123456789abcdef";
   char* hex = static_cast<char*>(palloc(loopbit::server::kHexDigits + 3));
-  char* end = hex;
-  *end++ = '\\';
-  *end++ = 'x';
-  for (std::size_t i = 0; i < kContentBytes; ++i) {
-    const auto byte = static_cast<unsigned char>(content[i]);
-    *end++ = kDigits[byte >> 4U];
-    *end++ = kDigits[byte & 15U];
-  }
-  *end = '\0';
+  hex[0] = '\\';
+  hex[1] = 'x';
+  hex_encode(PG_GETARG_POINTER(0), kContentBytes, hex + 2);
+  hex[2 + loopbit::server::kHexDigits] = '\0';
   PG_RETURN_CSTRING(hex);
 }
 

@@ -31,6 +31,7 @@ extern "C" {
 #include <storage/bufmgr.h>
 #include <storage/lmgr.h>
 #include <storage/smgr.h>
+#include <utils/builtins.h>
 #include <utils/guc.h>
 #include <utils/memutils.h>
 #include <utils/rel.h>
