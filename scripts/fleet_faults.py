@@ -1,0 +1,174 @@
+# SPDX-FileCopyrightText: 2026 The loopbit authors
+# SPDX-License-Identifier: MIT
+"""Servers that are killed or cut off while a robot adds to their map, for scripts/bench_fleet."""
+
+import csv
+import math
+import pathlib
+import random
+import subprocess
+import time
+
+from fleet_robots import percentile
+
+SEED = 37
+MAX_PAUSE_S = 2.5    # between faults
+MAX_DEAD_S = 2
+MAX_CUT_S = 12       # an answer is awaited for 10 s
+POLL_S = 0.02
+GIVEN_UP_S = 60
+NEAR_M = 25
+NEAR_DEG = 60
+
+
+def rows_of(file):
+    with pathlib.Path(file).open(newline="") as rows:
+        return list(csv.DictReader(rows))
+
+
+def loops_of(folder):
+    """The matches of the frames that a run calls loops in the end."""
+    loops = {row["frame"]: row["match"] for row in rows_of(folder / "loops.csv") if row["status"] == "loop"}
+    for row in rows_of(folder / "late_loops.csv"):
+        if row["kind"] == "late":
+            loops[row["frame"]] = row["match"]
+        else:
+            loops.pop(row["frame"], None)
+    return loops
+
+
+def poses_of(file):
+    """x, z and heading of each camera, from a file in KITTI's format."""
+    for line in file.read_text().splitlines():
+        numbers = list(map(float, line.split()))
+        yield numbers[3], numbers[11], math.atan2(numbers[2], numbers[10])
+
+
+class Town:
+    """A map with one session, of which each run gets a copy, and what a run says that nothing disturbs."""
+
+    def __init__(self, server, loopbit, first, images, laps, poses, folder):
+        """`first`: a map file with the session. `images`: of the next one, again and again. `poses`: of both."""
+        self.server, self.loopbit, self.folder = server, loopbit, folder
+        server.sql("postgres", "CREATE DATABASE faultless")
+        loopbit("map", "create", server.address("faultless"))
+        loopbit("map", "merge", server.address("faultless"), first)
+        self.images = folder / "drive.txt"
+        self.poses = list(poses_of(poses))
+        self.lap = len(list(images.iterdir()))
+        self.images.write_text("".join(f"{image.resolve()}\n" for image in laps * sorted(images.iterdir())))
+        undisturbed = folder / "undisturbed"
+        with self.run("undisturbed", undisturbed) as run:
+            if run.wait():
+                raise SystemExit("The undisturbed run failed.")
+        self.loops = loops_of(undisturbed)
+
+    def run(self, name, out):
+        self.server.sql("postgres", f"CREATE DATABASE {name} TEMPLATE faultless STRATEGY FILE_COPY")
+        return subprocess.Popen([self.loopbit.program, "run", self.images, "--map", self.server.address(name), "--out",
+                                 out, "--no-report", "--quiet"], stderr=subprocess.DEVNULL)
+
+    def pose(self, place):
+        """Of a place as loops.csv names it."""
+        session, _, frame = place.rpartition(":")
+        first = len(self.poses) - self.lap
+        return self.poses[int(frame) if session == "1" else first + int(frame) % self.lap]
+
+    def is_wrong(self, frame, match):
+        """A loop, by the rules of the world's not_false.csv."""
+        (x, z, heading), (match_x, match_z, match_heading) = self.pose(frame), self.pose(match)
+        turn = abs(math.remainder(heading - match_heading, 2 * math.pi))
+        return math.hypot(x - match_x, z - match_z) > NEAR_M or turn > math.radians(NEAR_DEG)
+
+    def saved_frames(self, name):
+        return int(self.server.sql(name, "SELECT coalesce(max(frames), 0) FROM loopbit.session WHERE session = 2"))
+
+
+class Faults:
+    """So many of each kind, in an order and at times that are always the same."""
+
+    def __init__(self, town, kills, cuts):
+        self.town = town
+        self.random = random.Random(SEED)
+        self.kinds = ["kill"] * kills + ["cut"] * cuts
+        self.random.shuffle(self.kinds)
+        self.found = {"kills": kills, "cuts": cuts, "fault_runs": 0, "fault_frames": 0, "merged_later": 0,
+                      "kill_lost": 0, "wrong_answers": 0, "other_matches": 0, "missed_loops": 0}
+        self.recovery_s = []
+
+    def disturb(self, kind):
+        """Returns when the server was there again."""
+        server = self.town.server
+        if kind == "kill":
+            server.kill()
+            time.sleep(self.random.uniform(0, MAX_DEAD_S))
+            server.start()
+        else:
+            with server.frozen():
+                time.sleep(self.random.uniform(0, MAX_CUT_S))
+        return time.monotonic()
+
+    def wait_for_frames(self, name, number, run):
+        """Whether the server got more than so many frames before the run ended."""
+        give_up = time.monotonic() + GIVEN_UP_S
+        while self.town.saved_frames(name) <= number:
+            if run.poll() is not None:
+                return False
+            if time.monotonic() > give_up:
+                raise SystemExit(f"'{name}' gets no frames.")
+            time.sleep(POLL_S)
+        return True
+
+    def run(self):
+        """Disturbs one run until it ends, and looks at what is left of it."""
+        name = f"faults{self.found['fault_runs']}"
+        out = self.town.folder / name
+        with self.town.run(name, out) as run:
+            goes_on = self.wait_for_frames(name, 0, run)
+            while goes_on and self.kinds:
+                time.sleep(self.random.uniform(0, MAX_PAUSE_S))
+                if run.poll() is not None:
+                    break
+                before = self.town.saved_frames(name)
+                again = self.disturb(self.kinds.pop())
+                goes_on = self.wait_for_frames(name, before, run)
+                if goes_on:
+                    self.recovery_s.append(time.monotonic() - again)
+            if run.wait():
+                raise SystemExit(f"A run failed: see {out}.")
+        self.look_at(name, out)
+        self.found["fault_runs"] += 1
+
+    def look_at(self, name, out):
+        town, found = self.town, self.found
+        address = town.server.address(name)
+        for queue in out.glob("queue*.db"):
+            town.loopbit("map", "merge", address, queue)
+            found["merged_later"] += 1
+        town.loopbit("map", "check", address)
+        given = {int(row["frame"]) for row in rows_of(out / "loops.csv")}
+        saved = set(map(int, town.server.sql(name, "SELECT frame FROM loopbit.place WHERE session = 2").split()))
+        found["fault_frames"] += len(given)
+        found["kill_lost"] += len(given - saved)
+        loops = loops_of(out)
+        found["wrong_answers"] += sum(town.is_wrong(*loop) for loop in loops.items()) + self.nowhere(name)
+        found["other_matches"] += sum(town.loops.get(frame) != match for frame, match in loops.items())
+        found["missed_loops"] += len(town.loops.keys() - loops.keys())
+        town.server.sql("postgres", f"DROP DATABASE {name}")
+
+    def nowhere(self, name):
+        """The loops that name a place that the map does not have."""
+        place = "SELECT FROM loopbit.place WHERE (place.session, place.frame) ="
+        return int(self.town.server.sql(
+            name, f"SELECT count(*) FROM loopbit.loop WHERE NOT EXISTS ({place} (loop.session, loop.frame)) OR "
+            f"NOT EXISTS ({place} (match_session, match_frame))"))
+
+
+def measure(town, kills, cuts):
+    """The fields of the faults' line, by name."""
+    faults = Faults(town, kills, cuts)
+    while faults.kinds:
+        faults.run()
+    recovery = faults.recovery_s or [0]
+    return {**faults.found, "recovery_p50_s": f"{percentile(recovery, 0.5):.2f}",
+            "recovery_max_s": f"{max(recovery):.2f}"}
