@@ -11,6 +11,9 @@ set(CPACK_SOURCE_IGNORE_FILES "^${root}/build/" "^${root}/loopbit_demo/" "^${roo
                               /dist/ /__pycache__/ [.]egg-info/ "^${root}/python/loopbit/.*[.]so$")
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL lib map images poses graph data dev tools python)
+if(LOOPBIT_BUILD_FLEET)
+  list(APPEND CPACK_COMPONENTS_ALL fleet)
+endif()
 if(LOOPBIT_BUILD_SERVER_SEARCH)
   list(APPEND CPACK_COMPONENTS_ALL postgres)
 endif()
@@ -56,6 +59,12 @@ set(CPACK_DEBIAN_GRAPH_PACKAGE_DEPENDS "libloopbit${abi} ${this}, libloopbit-pos
 set(CPACK_DEBIAN_GRAPH_DESCRIPTION "${summary}: pose graphs
  Tells right loops from wrong ones by odometry and corrects the trajectory.")
 
+set(CPACK_DEBIAN_FLEET_PACKAGE_NAME libloopbit-fleet${abi})
+set(CPACK_DEBIAN_FLEET_PACKAGE_SECTION libs)
+set(CPACK_DEBIAN_FLEET_PACKAGE_DEPENDS "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}")
+set(CPACK_DEBIAN_FLEET_DESCRIPTION "${summary}: maps on servers
+ Keeps maps in a PostgreSQL database that several robots share.")
+
 set(CPACK_DEBIAN_DATA_PACKAGE_NAME libloopbit-data${abi})
 set(CPACK_DEBIAN_DATA_PACKAGE_SECTION libs)
 set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS
@@ -66,14 +75,14 @@ set(CPACK_DEBIAN_DATA_DESCRIPTION "${summary}: data sets, scores, reports
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libloopbit-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, libopencv-dev")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, libloopbit-fleet${abi} ${this}, libopencv-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "${summary}: headers
  For programs that use loopbit, with CMake or pkg-config.")
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME loopbit)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}")
+    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, libloopbit-fleet${abi} ${this}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "${summary}: the command
  Finds loops in image sequences, scores and shows them.")
 
@@ -82,7 +91,7 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 if(LOOPBIT_BUILD_PYTHON)
   math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
   string(CONCAT CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-         "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, python3-numpy, "
+         "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, libloopbit-fleet${abi} ${this}, python3-numpy, "
          "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_minor})")
 endif()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS python3-matplotlib)

@@ -95,8 +95,9 @@ class Runner:
             raise BlockError("not a whole program")
         (self.program / "main.cpp").write_text(text)
         cmake_lists = (CONSUMER / "CMakeLists.txt").read_text()
-        if "loopbit/map_" in text:
-            cmake_lists = cmake_lists.replace("loopbit::loopbit", "loopbit::map")
+        for header, library in (("loopbit/fleet_", "loopbit::fleet"), ("loopbit/map_", "loopbit::map")):
+            if header in text:
+                cmake_lists = cmake_lists.replace("loopbit::loopbit", library)
         self.build(cmake_lists)
 
     def cmake(self, text):

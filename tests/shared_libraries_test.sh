@@ -30,6 +30,7 @@ link() {
 
 link loopbit
 link loopbit_map -lloopbit
+link loopbit_fleet -lloopbit_map -lloopbit
 link loopbit_images -lloopbit
 link loopbit_recordings -lloopbit_images -lloopbit_map -lloopbit
 link loopbit_poses -lloopbit -lopencv_calib3d -lyaml-cpp

@@ -160,6 +160,9 @@ void bind_detection(py::module_& module) {
       .def_readonly("matches", &Detection::matches, "Number of one-to-one feature matches.")
       .def_readonly("inliers", &Detection::inliers,
                     "Number of matches that fit one epipolar geometry.")
+      .def_readonly("epoch", &Detection::epoch,
+                    "Of a map on a server: all that was committed up to this epoch, and nothing "
+                    "later, was known of other sessions; 0 for other maps.")
       .def_readonly("times", &Detection::times, "The time of each step.")
       .def_readonly("late_loops", &Detection::late_loops,
                     "Loops of the last few views, which this frame made sure: their frames had "

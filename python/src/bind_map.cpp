@@ -137,6 +137,14 @@ std::optional<py::bytes> image_of(SharedReader& map, const py::object& row) {
   return py::bytes(reinterpret_cast<const char*>(jpeg->data()), jpeg->size());
 }
 
+std::string queue_of(SharedWriter& map) {
+  return map.exclusively([](MapWriter& writer) { return writer.queue(); });
+}
+
+void set_epoch(SharedReader& map, std::int64_t epoch) {
+  map.exclusively([&](MapReader& reader) { reader.set_epoch(epoch); });
+}
+
 void bind_session_frame(py::module_& module) {
   py::class_<SessionFrame>(module, "SessionFrame", "A frame of a session of a map.")
       .def(py::init([](int session, int frame) {
@@ -189,7 +197,8 @@ void bind_reader(py::module_& module) {
           py::init<const std::filesystem::path&, std::size_t>(), py::arg("path"),
           py::arg("cache_mb") = kMapCache_mb, Free(),
           "Raises InputError if the map is missing or cannot be read. cache_mb limits the features "
-          "kept in memory, in MiB.")
+          "kept in memory, in MiB. path may be the address of a map on a server, "
+          "'postgresql://...'.")
       .def_property_readonly("sessions",
                              py::cpp_function(&call<&MapReader::sessions, SharedReader>, Free()),
                              "The sessions that existed when the map was opened, in order.")
@@ -225,6 +234,10 @@ void bind_reader(py::module_& module) {
       .def_property_readonly("damage",
                              py::cpp_function(&call<&MapReader::damage, SharedReader>, Free()),
                              "The damage found so far, one clause each.")
+      .def("set_epoch", &set_epoch, py::arg("epoch"), Free(),
+           "From now on, a LoopDetector of this map sees what was committed up to this epoch, "
+           "without what was removed or rejected since then. Raises OptionError if the map is not "
+           "on a server or has not come so far.")
       .def("check_structure", &call<&MapReader::check_structure, SharedReader>, Free(),
            "The errors that SQLite's integrity_check reports; empty if there are none.")
       .def("__repr__", [](const SharedReader& self) {
@@ -240,17 +253,20 @@ void bind_writer(py::module_& module) {
       "forked child, every use raises OptionError.")
       .def(
           py::init([](const std::filesystem::path& path, const LoopDetectorOptions& options,
-                      const std::filesystem::path& name, bool keep_images, std::size_t cache_mb) {
+                      const std::filesystem::path& name, bool keep_images, std::size_t cache_mb,
+                      const std::optional<std::filesystem::path>& queue) {
             return std::make_shared<SharedWriter>(path, options, name.string(), keep_images,
-                                                  cache_mb);
+                                                  cache_mb, queue);
           }),
           py::arg("path"), py::arg("options"), py::arg("name"), py::arg("keep_images") = false,
-          py::arg("cache_mb") = kMapCache_mb, Free(),
+          py::arg("cache_mb") = kMapCache_mb, py::arg("queue") = py::none(), Free(),
           "Creates or continues a map. name describes the input of the session. keep_images also "
           "stores a small JPEG of each place. cache_mb limits the features kept in memory, in MiB. "
           "A session without frames is not stored. Raises OutputError if the map has a writer or "
           "cannot be written, and OptionError if it was made with other settings of "
-          "binary_content or surf.")
+          "binary_content or surf. path may be the address of a map on a server, "
+          "'postgresql://...', whose frames are queued in the map file queue first, by default "
+          "'town_session_2_queue.db' in the working folder.")
       .def_property_readonly("session",
                              py::cpp_function(&call<&MapWriter::session, SharedWriter>, Free()),
                              "Number of the session that is being written.")
@@ -260,12 +276,32 @@ void bind_writer(py::module_& module) {
       .def_property_readonly("damage",
                              py::cpp_function(&call<&MapWriter::damage, SharedWriter>, Free()),
                              "The damage found in candidates so far, one clause each.")
+      .def_property_readonly(
+          "queue",
+          [](SharedWriter& self) {
+            const std::string queue = [&] {
+              const WithoutGil release;
+              return queue_of(self);
+            }();
+            return Text{queue};
+          },
+          "The file of the queue, for merge_map(); empty if the map is a file, or the server has "
+          "everything after finish().")
+      .def_property_readonly(
+          "reconnections", py::cpp_function(&call<&MapWriter::reconnections, SharedWriter>, Free()),
+          "How often the server did not take frames for a while, and did so later.")
+      .def_property_readonly(
+          "unverified", py::cpp_function(&call<&MapWriter::unverified, SharedWriter>, Free()),
+          "How often a place was no match because the server did not send its features in time.")
+      .def("take_notices", &call<&MapWriter::take_notices, SharedWriter>, Free(),
+           "Sentences on the server, for the user, since the last call.")
       .def("flush", &call<&MapWriter::flush, SharedWriter>, Free(),
            "Commits what was added so far.")
       .def(
           "finish", &call<&MapWriter::finish, SharedWriter>, Free(),
           "Commits the rest and closes the file. A detector of this map cannot be used afterwards. "
-          "An unused writer does the same when it is collected, but ignores errors.")
+          "An unused writer does the same when it is collected, but ignores errors. What a server "
+          "does not take stays in queue.")
       .def("__enter__", [](const std::shared_ptr<SharedWriter>& self) { return self; })
       .def(
           "__exit__",

@@ -3,6 +3,9 @@
 #include <opencv2/core/utils/logger.hpp>
 #include <pybind11/pybind11.h>
 
+#ifdef LOOPBIT_HAS_FLEET
+#include "loopbit/fleet_map.hpp"
+#endif
 #include "loopbit/instruction_set.hpp"
 #include "loopbit/version.hpp"
 
@@ -17,6 +20,9 @@ PYBIND11_MODULE(_loopbit, module) {
   module.attr("__version__") = loopbit::kVersion;
   // loopbit reports bad images itself.
   cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+#ifdef LOOPBIT_HAS_FLEET
+  loopbit::use_fleet_maps();
+#endif
   python::bind_errors(module);
   module.def(
       "active_kernel", [] { return to_string(loopbit::active_instruction_set()); },

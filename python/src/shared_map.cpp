@@ -19,6 +19,16 @@ void SharedMap::for_each_earlier_loop(const VisitLoop& visit) {
   storage().for_each_earlier_loop(visit);
 }
 
+std::int64_t SharedMap::epoch() {
+  const auto guard = lock();
+  return storage().epoch();
+}
+
+MapNews SharedMap::news() {
+  const auto guard = lock();
+  return storage().news();
+}
+
 std::shared_ptr<const Features> SharedMap::features(PlaceId place) {
   const auto guard = lock();
   return storage().features(place);

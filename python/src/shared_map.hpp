@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "loopbit/map_file.hpp"
+#include "loopbit/map_server.hpp"
 #include "loopbit/picture_jpeg.hpp"
 
 namespace loopbit::python {
@@ -19,6 +21,7 @@ namespace loopbit::python {
 /// functions but the constructor and path() without the GIL; see SharedDetector.
 class SharedMap : public MapStorage {
  public:
+  /// `path`: without secrets.
   explicit SharedMap(std::string path) : path_(std::move(path)) {}
 
   [[nodiscard]] const std::string& path() const { return path_; }
@@ -29,6 +32,8 @@ class SharedMap : public MapStorage {
   void check_options(const LoopDetectorOptions& options) final;
   void for_each_earlier_place(const Visit& visit) final;
   void for_each_earlier_loop(const VisitLoop& visit) final;
+  std::int64_t epoch() final;
+  MapNews news() final;
   std::shared_ptr<const Features> features(PlaceId place) final;
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& image) final;
@@ -52,7 +57,7 @@ class SharedMap : public MapStorage {
 class SharedReader : public SharedMap {
  public:
   SharedReader(const std::filesystem::path& path, std::size_t cache_mb)
-      : SharedMap(path.string()), reader_(path.string(), cache_mb) {}
+      : SharedMap(without_secrets(path.string())), reader_(path.string(), cache_mb) {}
 
   [[nodiscard]] std::optional<LoopDetectorOptions> options() const override;
 
@@ -72,11 +77,14 @@ class SharedReader : public SharedMap {
 class SharedWriter : public SharedMap {
  public:
   SharedWriter(const std::filesystem::path& path, const LoopDetectorOptions& options,
-               const std::string& name, bool keep_images, std::size_t cache_mb)
-      : SharedMap(path.string()),
+               const std::string& name, bool keep_images, std::size_t cache_mb,
+               const std::optional<std::filesystem::path>& queue)
+      : SharedMap(without_secrets(path.string())),
         options_(options),
         writer_(path.string(), options, name, keep_images ? picture_jpeg : EncodeImage{},
-                cache_mb) {}
+                cache_mb) {
+    if (queue) writer_.set_queue(queue->string());
+  }
 
   [[nodiscard]] std::optional<LoopDetectorOptions> options() const override { return options_; }
 

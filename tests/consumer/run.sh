@@ -41,12 +41,12 @@ components() {
     -DCMAKE_PREFIX_PATH="$prefix" "$@" | tee "$scratch/found"
 }
 components
-for component in loopbit images poses graph map recordings data both; do
+for component in loopbit images poses graph map fleet recordings data both; do
   grep -qxF -e "-- found $component" "$scratch/found"
 done
 if [[ $is_static ]]; then
   components -DCMAKE_DISABLE_FIND_PACKAGE_ZLIB=ON
-  [[ $(grep -e '-- found' "$scratch/found") == $'-- found loopbit\n-- found images\n-- found poses\n-- found graph\n-- found map' ]]
+  [[ $(grep -e '-- found' "$scratch/found") == $'-- found loopbit\n-- found images\n-- found poses\n-- found graph\n-- found map\n-- found fleet' ]]
   grep -qF -e '-- not both: loopbit::data is not there: zlib or matio' "$scratch/found"
   for without in -DCMAKE_DISABLE_FIND_PACKAGE_{SQLite3,PkgConfig}=ON; do
     components "$without"
