@@ -87,10 +87,13 @@ std::string detection_text(const Detection& d) {
   return text + ")";
 }
 
-void bind_detection(py::module_& module) {
+void bind_status(py::module_& module) {
   py::enum_<Status> status(module, "Status",
                            "The decision for a frame, with one value per reason of rejection.");
   for (const Status each : kAllStatuses) status.value(to_string(each).data(), each);
+}
+
+void bind_step_times(py::module_& module) {
   py::class_<StepTimes>(module, "StepTimes", "Wall time of the steps of one detection.")
       .def_readonly("content_ms", &StepTimes::content_ms,
                     "Binary content, including the conversion to grey.")
@@ -104,6 +107,9 @@ void bind_detection(py::module_& module) {
             "verification_ms={:.3f})",
             t.content_ms, t.retrieval_ms, t.features_ms, t.verification_ms);
       });
+}
+
+void bind_score_terms(py::module_& module) {
   py::class_<ScoreTerms>(
       module, "ScoreTerms",
       "The terms of the log odds of a match, in nats. With their sum S the score "
@@ -123,6 +129,9 @@ void bind_detection(py::module_& module) {
             "ScoreTerms(votes={:.2f}, geometry={:.2f}, path={:.2f}, rivals={:.2f}, prior={:.2f})",
             t.votes, t.geometry, t.path, t.rivals, t.prior);
       });
+}
+
+void bind_late_loop(py::module_& module) {
   py::class_<LateLoop>(module, "LateLoop",
                        "A loop of an earlier frame that a later one found, or withdrew.")
       .def_readonly("frame", &LateLoop::frame, "The earlier frame, of this session.")
@@ -138,6 +147,9 @@ void bind_detection(py::module_& module) {
             loop.match ? fmt::format("{}", *loop.match) : literal(py::cast(loop.earlier_match)),
             loop.score);
       });
+}
+
+void bind_detection(py::module_& module) {
   py::class_<Detection>(module, "Detection",
                         "The result for one frame, with the numbers behind the decision.")
       .def_readonly("frame", &Detection::frame, "Number of the frame, from 0.")
@@ -359,6 +371,10 @@ LoopDetectorOptions SharedDetector::options() const {
 }
 
 void bind_detector(py::module_& module) {
+  bind_status(module);
+  bind_step_times(module);
+  bind_score_terms(module);
+  bind_late_loop(module);
   bind_detection(module);
   bind_ranked_place(module);
   bind_evidence(module);

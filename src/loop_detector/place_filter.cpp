@@ -114,6 +114,32 @@ ByStep log_ratios(const std::vector<PlaceFilter::Observed>& observed) {
   return largest_of_steps(observed, [](const auto& o) { return o.log_likelihood_ratio(); });
 }
 
+/// Bayes' rule: makes a prior the posterior, given the log likelihood ratio of each step that was
+/// looked at against "somewhere new". Returns the probability of the latter, even where it is very
+/// small.
+double weigh(const ByStep& ratios, Belief& belief) {
+  double elsewhere = belief.elsewhere();
+  double sum = elsewhere;
+  for (Hypothesis& h : belief.places) {
+    const auto found = find_step(ratios, h.step);
+    const double ratio = found == ratios.end() ? 1.0 : std::exp(found->second);
+    h.forward *= ratio;
+    h.backward *= ratio;
+    sum += h.probability();
+  }
+  for (Hypothesis& h : belief.places) {
+    h.forward /= sum;
+    h.backward /= sum;
+  }
+  elsewhere /= sum;
+  std::erase_if(belief.places, [&](const Hypothesis& h) {
+    const bool is_dropped = h.probability() < kMinProbability;
+    if (is_dropped) elsewhere += h.probability();
+    return is_dropped;
+  });
+  return elsewhere;
+}
+
 /// Of the candidates that may match and for which `is_eligible(o)`, the one with the largest
 /// `value(o)`.
 template <typename Eligible, typename Value>
@@ -345,27 +371,8 @@ PlaceFilter::Update PlaceFilter::update(Belief prior,
   add_returns(update.returns, prior);
   share_among_laps(loops, prior.places);
 
-  // Bayes: prior times likelihood ratio, against "somewhere new", whose ratio is 1.
-  const ByStep ratios = log_ratios(update.observed);
-  double sum = prior.elsewhere();
   update.belief = prior;
-  for (Hypothesis& h : update.belief.places) {
-    const auto found = find_step(ratios, h.step);
-    const double ratio = found == ratios.end() ? 1.0 : std::exp(found->second);
-    h.forward *= ratio;
-    h.backward *= ratio;
-    sum += h.probability();
-  }
-  for (Hypothesis& h : update.belief.places) {
-    h.forward /= sum;
-    h.backward /= sum;
-  }
-  double elsewhere = prior.elsewhere() / sum;
-  std::erase_if(update.belief.places, [&](const Hypothesis& h) {
-    const bool is_dropped = h.probability() < kMinProbability;
-    if (is_dropped) elsewhere += h.probability();
-    return is_dropped;
-  });
+  const double elsewhere = weigh(log_ratios(update.observed), update.belief);
   update.prior = std::move(prior);
   const auto middle = update.belief.peak();
   update.match = choose_match(middle, loops, update);
