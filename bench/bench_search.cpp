@@ -19,6 +19,7 @@
 #include "loopbit/map_file.hpp"
 #include "loopbit/map_server.hpp"
 #include "loopbit/place_index.hpp"
+#include "loopbit/sharded_map.hpp"
 
 #include "long_sequence.hpp"
 #include "place_contents.hpp"
@@ -98,33 +99,35 @@ class Server {
   std::unique_ptr<PGconn, decltype(&PQfinish)> connection_;
 };
 
-/// Adds the places to the map of the server, which is made, and to the index.
+/// Adds the places of a session to the map of the server, which is made, and to the index.
 class Builder {
  public:
   Builder(Server& server, const std::string& address, LongSequence& sequence, PlaceIndex& index)
-      : server_(server), sequence_(sequence), index_(index) {
+      : server_(server), sequence_(sequence), index_(index), first_(index.size()) {
     MapWriter map(address, {}, "bench_search");
     map.add({.status = Status::no_similar_place}, next(), std::make_shared<const Features>(), {});
     map.finish();
+    session_ = map.session();
     // Other tables are not asked about each place.
     server.run(
         "SET session_replication_role = replica; DROP INDEX IF EXISTS place_content; "
         "CREATE TEMP TABLE new (frame bigint, content bytea)");
   }
 
-  /// Adds places up to this number; returns how long the server took.
+  /// Adds places until the index has this number; returns how long the server took.
   double grow_to(std::size_t places) {
     server_.run("COPY new FROM STDIN");
     while (static_cast<std::size_t>(index_.size()) < places) {
-      const PlaceId frame = index_.size();
+      const PlaceId frame = index_.size() - first_;
       server_.send(fmt::format("{}\t\\{}\n", frame, hex_of(next())));
     }
     server_.end_sending();
     const double ms = ms_of([&] {
       server_.run(
-          "INSERT INTO place (place, session, frame, content, checksum, batch) SELECT "
-          "(1::bigint << 32) + frame, 1, frame, content, place_checksum(1, frame, NULL, "
-          "content::binary_content), 1 FROM new");
+          fmt::format("INSERT INTO place (place, session, frame, content, checksum, batch) SELECT "
+                      "({0}::bigint << 32) + frame, {0}, frame, content, place_checksum({0}, "
+                      "frame, NULL, content::binary_content), 1 FROM new",
+                      session_));
     });
     server_.run("TRUNCATE new");
     return ms;
@@ -136,6 +139,8 @@ class Builder {
   Server& server_;
   LongSequence& sequence_;
   PlaceIndex& index_;
+  PlaceId first_;
+  int session_ = 0;
 };
 
 /// Every other one is a revisit, the others are new places.
@@ -213,31 +218,57 @@ void measure_scans(Server& server, const std::vector<BinaryContent>& queries) {
              pages / static_cast<double>(asked));
 }
 
-/// bench_search DATA ADDRESS PLACES QUERIES: one line of fields.
-void run(const std::vector<std::string>& arguments) {
-  if (arguments.size() != 4) {
-    throw std::runtime_error("usage: bench_search DATA ADDRESS PLACES QUERIES");
+/// Makes the index of the server's extension.
+void make_index(Server& server) {
+  server.run("CREATE INDEX place_content ON place USING loopbit ((content::binary_content))");
+}
+
+/// What is put into maps, and asked.
+struct Drives {
+  explicit Drives(const std::string& data)
+      : map(data, {"kitti03", "office_tour", "lateral_corridor"}, 21, 6),
+        elsewhere(data, {"euroc_room"}, 91, 1) {}
+
+  LongSequence map;
+  LongSequence elsewhere;
+};
+
+/// Each shard has a session of as many places.
+void run_shards(Drives& drives, const std::vector<std::string>& addresses, std::size_t places,
+                std::size_t queries) {
+  PlaceIndex index;
+  for (std::size_t i = 0; i < addresses.size(); ++i) {
+    const std::string& address = addresses[i];
+    const int session = static_cast<int>(i) + 1;
+    if (!create_map(address, session)) throw std::runtime_error("there is a map already");
+    Server server(address);
+    Builder(server, address, drives.map, index).grow_to(places * (i + 1) / addresses.size());
+    make_index(server);
+    server.run("VACUUM ANALYZE place");
   }
-  const std::string& address = arguments[1];
-  const std::size_t places = std::max(std::stoul(arguments[2]), 2 * kInserted);
-  use_fleet_maps();
+  PlaceMemory memory(std::make_shared<ShardedMap>(addresses));
+  const double open_ms = ms_of([&] { memory.restore_searched(0.8); });
+  compare(PlaceContents(memory), index,
+          make_queries(drives.map, drives.elsewhere, places, queries));
+  fmt::print(" open_s={:.2f}\n", open_ms / 1e3);
+}
+
+void run_one(Drives& drives, const std::string& address, std::size_t places,
+             std::size_t number_of_queries) {
   if (!create_map(address)) throw std::runtime_error("there is a map already");
   Server server(address);
-  LongSequence map(arguments[0], {"kitti03", "office_tour", "lateral_corridor"}, 21, 6);
-  const LongSequence elsewhere(arguments[0], {"euroc_room"}, 91, 1);
+  LongSequence& map = drives.map;
   PlaceIndex index;
   Builder builder(server, address, map, index);
   builder.grow_to(places - 2 * kInserted);
   const double plain_ms = builder.grow_to(places - kInserted);
-  const double build_ms = ms_of([&] {
-    server.run("CREATE INDEX place_content ON place USING loopbit ((content::binary_content))");
-  });
+  const double build_ms = ms_of([&] { make_index(server); });
   const double insert_ms = builder.grow_to(places);
   server.run("VACUUM ANALYZE place");
   auto reader = std::make_shared<MapReader>(address);
   PlaceMemory memory(reader);
   const double open_ms = ms_of([&] { memory.restore_searched(0.8); });
-  const auto queries = make_queries(map, elsewhere, places, std::stoul(arguments[3]));
+  const auto queries = make_queries(map, drives.elsewhere, places, number_of_queries);
   compare(PlaceContents(memory), index, queries);
   measure_scans(server, queries);
   fmt::print(
@@ -245,6 +276,20 @@ void run(const std::vector<std::string>& arguments) {
       "insert_without_index_us={:.1f}\n",
       server.number("SELECT pg_relation_size('place_content')") / static_cast<double>(places),
       build_ms / 1e3, open_ms / 1e3, 1e3 * insert_ms / kInserted, 1e3 * plain_ms / kInserted);
+}
+
+/// bench_search DATA ADDRESSES PLACES QUERIES: one line of fields.
+void run(const std::vector<std::string>& arguments) {
+  if (arguments.size() != 4) {
+    throw std::runtime_error("usage: bench_search DATA ADDRESSES PLACES QUERIES");
+  }
+  const std::vector<std::string> addresses = addresses_in(arguments[1]);
+  const std::size_t places = std::max(std::stoul(arguments[2]), 2 * kInserted);
+  const std::size_t queries = std::stoul(arguments[3]);
+  use_fleet_maps();
+  Drives drives(arguments[0]);
+  if (addresses.size() > 1) return run_shards(drives, addresses, places, queries);
+  run_one(drives, addresses.front(), places, queries);
 }
 
 }  // namespace

@@ -419,6 +419,75 @@ class FleetTest(CommandTest):
         self.assertGreaterEqual(uses(), before + len(images))
         self.assertTrue(QUICK or any(json.loads(line)["status"] == "loop" for line in of_file))
 
+    def new_shards(self):
+        """The addresses of two maps with a session each, and a file with both."""
+        one, addresses = self.scratch / "one.db", []
+        for number, name in enumerate(("first", "second"), start=1):
+            self.server.sql("postgres", f"CREATE DATABASE shard{number}")
+            self.addCleanup(self.server.sql, "postgres", f"DROP DATABASE IF EXISTS shard{number} WITH (FORCE)")
+            addresses.append(self.server.address(f"shard{number}"))
+            self.lines("map", "create", addresses[-1], "--first-session", number)
+            file = self.scratch / f"{name}.db"
+            ran = loopbit("run", self.shared / name, "--map", file, "--no-report")
+            self.assertEqual(ran.returncode, 0, ran.stderr)
+            for into in (addresses[-1], one):
+                self.lines("map", "merge", into, file)
+        return addresses, one
+
+    def test_several_servers_answer_as_one_map(self):
+        addresses, one = self.new_shards()
+        images = sorted(self.images.iterdir())[1::FRAMES // 6]
+        query = ("--json", "--places", "30")
+        of_one = self.lines("query", one, *images, *query)
+        self.assertTrue(QUICK or any(json.loads(line)["status"] == "loop" for line in of_one))
+        self.assertEqual({place["session"] for line in of_one for place in json.loads(line)["places"]}, {1, 2})
+        for order in (addresses, addresses[::-1]):
+            self.assertEqual(self.lines("query", " ".join(order), *images, *query), of_one)
+        self.server.sql("shard2", "DROP INDEX IF EXISTS loopbit.place_content")    # its contents are read
+        self.assertEqual(self.lines("query", " ".join(addresses), *images, *query), of_one)
+
+        def answers(lines):
+            return [{name: value for name, value in json.loads(line).items() if name not in ("epoch", "not_asked")}
+                    for line in lines]
+
+        dead = "postgresql://robot1:secret@127.0.0.1:1/town"
+        shown = "postgresql://robot1@127.0.0.1:1/town"
+        ran = loopbit("query", f"{dead} {addresses[0]}", *images, *query)
+        self.assertEqual(ran.returncode, 3)
+        self.assertEqual(answers(ran.stdout.splitlines()), answers(self.lines("query", addresses[0], *images, *query)))
+        self.assertTrue(all(json.loads(line)["not_asked"] == [shown] for line in ran.stdout.splitlines()))
+        self.assertRegex(ran.stderr, f"^loopbit: '{shown}' cannot be read .*refused.*\n$")
+        ran = loopbit("query", f"{addresses[0]} {dead}", images[0])
+        self.assertIn(f"not asked: {shown}", ran.stdout)
+        self.assertNotIn("secret", ran.stdout + ran.stderr)
+        self.assert_fails(loopbit("query", f"{dead} {dead}", images[0]), 3, "refused")
+        twice = f"{addresses[0]} {addresses[0]}"
+        self.assert_fails(loopbit("query", twice, images[0]), 2, "Session 1 is in", "--first-session")
+        self.assert_fails(loopbit("query", " ".join(addresses), images[0], "--epoch", "1"), 2, "one address")
+        for command in (("map", "info"), ("map", "create"), ("run", self.images, "--map")):
+            ran = loopbit(*command, " ".join((dead, addresses[0])), cwd=self.scratch)
+            self.assert_fails(ran, 2, "are several maps", shown)
+            self.assertNotIn("secret", ran.stdout + ran.stderr)
+
+    def test_a_server_that_is_lost_during_queries_is_named(self):
+        addresses, _ = self.new_shards()
+        images = sorted(self.images.iterdir())
+        folder = self.scratch / "arriving"
+        folder.mkdir()
+        with subprocess.Popen([LOOPBIT, "query", " ".join(addresses), "--watch", folder, "--json", "--map-cache-mb",
+                               "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as query:
+            (folder / "a.png").symlink_to(images[HALF + 3])
+            answer = json.loads(query.stdout.readline())
+            self.assertNotIn("not_asked", answer)
+            self.assertIn(2, {place["session"] for place in answer["places"]})
+            self.server.sql("postgres", "DROP DATABASE shard2 WITH (FORCE)")
+            (folder / "b.png").symlink_to(images[HALF + 4])
+            answer = json.loads(query.stdout.readline())
+            self.assertEqual(answer["not_asked"], [self.server.address("shard2", password=None)])
+            query.send_signal(signal.SIGINT)
+            _, stderr = query.communicate()
+        self.assertEqual(query.returncode, 3, stderr)
+
     def test_another_version_is_refused(self):
         for version, remedy in (99, "newer loopbit"), (1, "'loopbit map merge COPY.db ADDRESS'"):
             self.server.sql("town", f"UPDATE loopbit.migration SET version = {version}")

@@ -201,8 +201,8 @@ int check_command(const std::string& path, const std::string& recover) {
   return check.damage.empty() ? success : bad_input;
 }
 
-void create_command(const std::string& address) {
-  const bool is_new = create_map(address);
+void create_command(const std::string& address, int first_session) {
+  const bool is_new = create_map(address, first_session);
   fmt::print("{}    {}\n", is_new ? "created" : "exists ", printable(without_secrets(address)));
 }
 
@@ -227,6 +227,7 @@ struct MapFlags {
   ExportFormat format = ExportFormat::csv;
   std::string out;
   std::string recover;
+  int first_session = 1;
   CompactOptions compact;
 };
 
@@ -277,7 +278,14 @@ void add_writers(CLI::App& map, const Flags& flags, int& exit_code) {
   CLI::App* create = map.add_subcommand(
       "create", "Make an empty map, and the roles that use it, in a PostgreSQL database");
   create->add_option("ADDRESS", flags->map, "Such as postgresql://owner@host/town")->required();
-  create->callback([flags] { create_command(flags->map); });
+  create
+      ->add_option("--first-session", flags->first_session,
+                   "The number of its first session: maps that are asked together need sessions of "
+                   "different numbers")
+      ->type_name("N")
+      ->capture_default_str()
+      ->check(whole_number(1, 2'000'000'000));
+  create->callback([flags] { create_command(flags->map, flags->first_session); });
 
   CLI::App* merge = add_command(map, flags, "merge", "Add the sessions of other maps to a map");
   merge

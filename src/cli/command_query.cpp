@@ -18,10 +18,12 @@
 #include "loopbit/gray_image.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
+#include "loopbit/map_server.hpp"
 #include "loopbit/printable.hpp"
 #include "loopbit/record_run.hpp"
 #include "loopbit/recordings.hpp"
 #include "loopbit/relative_pose.hpp"
+#include "loopbit/sharded_map.hpp"
 
 #include "commands.hpp"
 #include "map_output.hpp"
@@ -51,7 +53,52 @@ struct QueryFlags {
   bool json = false;
 };
 
-LoopDetectorOptions detector_options(const MapReader& map, const QueryFlags& flags) {
+/// The map that is asked: one, or several that have its sessions together.
+class AskedMap {
+ public:
+  explicit AskedMap(const QueryFlags& flags) {
+    const std::vector<std::string> addresses = addresses_in(flags.map);
+    if (addresses.size() == 1) {
+      map_ = std::make_shared<MapReader>(flags.map, flags.map_cache_mb);
+      if (flags.epoch) map_->set_epoch(*flags.epoch);
+    } else if (flags.epoch || !flags.place_images.empty()) {
+      throw Error(ErrorKind::option, "--epoch and --place-images ask one map; give one address.");
+    } else {
+      shards_ = std::make_shared<ShardedMap>(addresses, flags.map_cache_mb);
+    }
+  }
+
+  [[nodiscard]] std::shared_ptr<MapStorage> storage() const {
+    return shards_ ? std::shared_ptr<MapStorage>(shards_) : map_;
+  }
+  [[nodiscard]] LoopDetectorOptions options() const {
+    return shards_ ? shards_->options() : map_->options();
+  }
+  [[nodiscard]] std::string path() const { return shards_ ? shards_->path() : map_->path(); }
+
+  /// Of a single map.
+  [[nodiscard]] MapReader& reader() const { return *map_; }
+
+  void warn() const {
+    if (shards_) return warn_of_damage(shards_->path(), shards_->damage());
+    warn_of_damage(*map_);
+  }
+
+  /// Of several maps, those that do not answer. Says on stderr why, once.
+  [[nodiscard]] std::vector<std::string> not_asked() const {
+    if (!shards_) return {};
+    for (const std::string& notice : shards_->take_notices()) {
+      tell(fmt::format("loopbit: {}\n", notice));
+    }
+    return shards_->not_asked();
+  }
+
+ private:
+  std::shared_ptr<MapReader> map_;  ///< either this or the other
+  std::shared_ptr<ShardedMap> shards_;
+};
+
+LoopDetectorOptions detector_options(const AskedMap& map, const QueryFlags& flags) {
   LoopDetectorOptions options = map.options();
   for (const std::string& setting : flags.settings) {
     const auto [name, value] = split_setting(setting);
@@ -79,12 +126,6 @@ struct ShownPlace {
   std::string image = {};  ///< its file; empty if there is none
 };
 
-std::shared_ptr<MapReader> open_map(const QueryFlags& flags) {
-  auto map = std::make_shared<MapReader>(flags.map, flags.map_cache_mb);
-  if (flags.epoch) map->set_epoch(*flags.epoch);
-  return map;
-}
-
 void print_row(const std::string& image, std::string_view status, const ShownPlace& shown) {
   const RankedPlace& place = shown.ranked;
   fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7.4f}  {:>10.3f}  {:>7}{}{}\n", image, status,
@@ -98,7 +139,8 @@ struct Answer {
   std::int64_t epoch = 0;  ///< see Detection
   std::vector<ShownPlace> places = {};
   std::optional<RelativePose> pose =
-      std::nullopt;  ///< of the image, in the frame of the first place
+      std::nullopt;                         ///< of the image, in the frame of the first place
+  std::vector<std::string> not_asked = {};  ///< of several maps, those that do not answer
 };
 
 void print_pose(const RelativePose& pose) {
@@ -114,6 +156,9 @@ void print_rows(const std::string& name, const Answer& answer) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     print_row(i == 0 ? image : "", i == 0 ? to_string(answer.status) : "", places[i]);
     if (i == 0 && answer.pose) print_pose(*answer.pose);
+  }
+  for (const std::string& map : answer.not_asked) {
+    fmt::print("{:<24}  not asked: {}\n", "", printable(map));
   }
 }
 
@@ -155,6 +200,7 @@ void print_line(const std::string& image, const Answer& answer) {
     if (!file.empty()) json["places"].back()["image"] = file;
   }
   if (answer.pose) json["relative_pose"] = json_of(*answer.pose);
+  if (!answer.not_asked.empty()) json["not_asked"] = answer.not_asked;
   const std::string text =
       json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   fmt::print("{}\n", printable_json(text));
@@ -165,8 +211,8 @@ class Relocalizer {
  public:
   explicit Relocalizer(const QueryFlags& flags)
       : flags_(flags),
-        map_(open_map(flags)),
-        detector_(detector_options(*map_, flags), map_),
+        map_(flags),
+        detector_(detector_options(map_, flags), map_.storage()),
         surf_(detector_.options().surf) {
     if (!flags.mask.empty()) {
       mask_ = read_mask(flags.mask);
@@ -175,7 +221,7 @@ class Relocalizer {
     if (!flags.camera.empty()) camera_ = read_camera(flags.camera);
     // As in a run: through other lenses it finds no more than without.
     if (camera_ && camera_->lens == Lens::equidistant) detector_.set_camera(camera_);
-    if (!flags.place_images.empty()) place_images_.emplace(*map_, flags.place_images);
+    if (!flags.place_images.empty()) place_images_.emplace(map_.reader(), flags.place_images);
     if (!flags.json) {
       fmt::print("{:<24}  {:<16}  {:>7}  {:>7}  {:>7}  {:>10}  {:>7}\n", "image", "status",
                  "session", "frame", "score", "similarity", "inliers");
@@ -203,7 +249,7 @@ class Relocalizer {
   }
 
   [[nodiscard]] bool any_readable() const { return any_readable_; }
-  [[nodiscard]] const MapReader& map() const { return *map_; }
+  [[nodiscard]] const AskedMap& map() const { return map_; }
 
  private:
   void answer(const Frame& frame) {
@@ -220,6 +266,7 @@ class Relocalizer {
       if (error.kind() != ErrorKind::input) throw;
       tell(fmt::format("loopbit: '{}': {}\n", frame.name, error.what()));
     }
+    answer.not_asked = map_.not_asked();
     if (camera_ && answer.status == Status::loop) answer.pose = pose_of(frame, places.front());
     if (places.size() > flags_.places) places.resize(flags_.places);
     for (const RankedPlace& place : places) {
@@ -238,7 +285,7 @@ class Relocalizer {
   }
 
   const QueryFlags& flags_;
-  std::shared_ptr<MapReader> map_;
+  AskedMap map_;
   LoopDetector detector_;
   cv::Mat1b mask_;  ///< empty = none
   std::optional<CameraModel> camera_;
@@ -264,7 +311,8 @@ int query_command(const QueryFlags& flags) {
       std::this_thread::sleep_for(kWatchPause);
     }
   }
-  warn_of_damage(relocalizer.map());
+  relocalizer.map().warn();
+  if (!relocalizer.map().not_asked().empty()) return bad_input;
   return flags.images.empty() || relocalizer.any_readable() ? success : bad_input;
 }
 
@@ -274,7 +322,11 @@ void add_query(CLI::App& app, int& exit_code) {
   auto flags = std::make_shared<QueryFlags>();
   CLI::App* command =
       app.add_subcommand("query", "Find the places of a map that single images show");
-  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map', or its address")
+  command
+      ->add_option(
+          "MAP", flags->map,
+          "A map written by 'loopbit run --map', or its address; several addresses, separated by "
+          "spaces, are asked as one map")
       ->required();
   command->add_option("IMAGE", flags->images,
                       "Images, or anything else that 'loopbit run' accepts; each image is a "

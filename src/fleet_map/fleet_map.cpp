@@ -36,14 +36,14 @@ class Postgres final : public MapServer {
     return std::make_unique<FleetDatabase>(Address(address), access);
   }
 
-  [[nodiscard]] bool create(const std::string& address) const override {
+  [[nodiscard]] bool create(const std::string& address, int first_session) const override {
     const Connection connection(Address(address), MapDatabase::Access::write);
     connection.execute("BEGIN; SELECT pg_advisory_xact_lock(1819242352, -1)");
     if (has_tables(connection)) {
       check_version(connection);
       return false;
     }
-    create_tables(connection);
+    create_tables(connection, first_session);
     connection.execute("COMMIT");
     return true;
   }

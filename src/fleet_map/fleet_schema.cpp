@@ -176,9 +176,10 @@ $$)";
 
 }  // namespace
 
-void create_tables(const Connection& connection) {
+void create_tables(const Connection& connection, int first_session) {
   connection.execute(kRoles);
   for (const char* part : {kTables, kFunctions, kRights, kSearch}) connection.execute(part);
+  connection.run("SELECT setval('session_number', $1, false)", {parameter(first_session)});
   connection.run("INSERT INTO migration (version) VALUES ($1)", {parameter(kFleetVersion)});
 }
 

@@ -9,8 +9,8 @@ namespace loopbit {
 /// The version of the tables on a server. All are those of map files of version 4.
 inline constexpr int kFleetVersion = 2;
 
-/// Makes the tables and roles in the current transaction.
-void create_tables(const Connection& connection);
+/// Makes the tables and roles in the current transaction. `first_session`: its number.
+void create_tables(const Connection& connection, int first_session);
 
 /// Whether the database has tables of a map, of whatever version.
 bool has_tables(const Connection& connection);

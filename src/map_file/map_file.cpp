@@ -178,6 +178,10 @@ PlaceSearch* MapReader::place_search() {
   return impl_->searched && impl_->epoch == 0 ? &*impl_->searched : nullptr;
 }
 
+void MapReader::set_time_limit(std::chrono::milliseconds limit) {
+  impl_->database->set_time_limit(limit);
+}
+
 void MapReader::set_epoch(std::int64_t epoch) {
   const std::int64_t last = impl_->database->epoch();
   if (epoch > 0 && epoch <= last) {

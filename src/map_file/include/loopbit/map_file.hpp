@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -148,6 +149,9 @@ class MapReader : public MapStorage {
 
   /// Of a map on a server, the address without passwords.
   [[nodiscard]] const std::string& path() const;
+
+  /// A server that answers later than this is an Error (kind input); 0 = it may take any time.
+  void set_time_limit(std::chrono::milliseconds limit);
 
   /// From now on, a LoopDetector of this map sees what was committed up to this epoch, without what
   /// was removed or rejected since then. Throws Error (kind option) if the map is not on a server

@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "loopbit/map_database.hpp"
 
@@ -30,9 +31,10 @@ class MapServer {
   [[nodiscard]] virtual std::unique_ptr<MapDatabase> open(const std::string& address,
                                                           MapDatabase::Access access) const = 0;
 
-  /// Makes the tables of an empty map, and the roles that read and write it. False, and nothing is
-  /// changed, if they are there. Throws Error (kind output).
-  [[nodiscard]] virtual bool create(const std::string& address) const = 0;
+  /// Makes the tables of an empty map, whose sessions get numbers from `first_session` on, and the
+  /// roles that read and write it. False, and nothing is changed, if they are there. Throws Error
+  /// (kind output).
+  [[nodiscard]] virtual bool create(const std::string& address, int first_session) const = 0;
 };
 
 /// Makes maps on servers usable, by their addresses, wherever a map's path is expected. Call it
@@ -44,7 +46,10 @@ void set_map_server(std::unique_ptr<const MapServer> server);
 
 /// Makes an empty map on a server; see MapServer::create(). Throws Error (kind option) if `address`
 /// is none.
-[[nodiscard]] bool create_map(const std::string& address);
+[[nodiscard]] bool create_map(const std::string& address, int first_session = 1);
+
+/// The addresses of maps on several servers, separated by spaces; else `path` itself.
+[[nodiscard]] std::vector<std::string> addresses_in(const std::string& path);
 
 /// The database of a map on a server, the path of a file without its extension.
 [[nodiscard]] std::string map_stem(const std::string& path);
