@@ -6,9 +6,10 @@
 
 namespace loopbit {
 
-/// How soon a server is tried again, doubled each time.
+/// How soon a server is tried again, doubled each time: robots should learn of each other within a
+/// second, also after it was away.
 inline constexpr std::chrono::milliseconds kFirstPause{100};
-inline constexpr std::chrono::milliseconds kMaxPause{5000};
+inline constexpr std::chrono::milliseconds kMaxPause{1000};
 
 /// An answer of a few kilobytes that takes longer does not come.
 inline constexpr std::chrono::milliseconds kMaxAnswer{10000};
