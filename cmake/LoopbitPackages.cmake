@@ -72,17 +72,25 @@ set(CPACK_DEBIAN_DATA_PACKAGE_DEPENDS
 set(CPACK_DEBIAN_DATA_DESCRIPTION "${summary}: data sets, scores, reports
  Reads ground truth, scores loops, and writes reports.")
 
+# What has all our libraries.
+set(libraries "")
+foreach(library "" -map -images -poses -graph -data)
+  list(APPEND libraries "libloopbit${library}${abi} ${this}")
+endforeach()
+if(LOOPBIT_BUILD_FLEET)
+  list(APPEND libraries "libloopbit-fleet${abi} ${this}")
+endif()
+list(JOIN libraries ", " libraries)
+
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libloopbit-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
-set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, libloopbit-fleet${abi} ${this}, libopencv-dev")
+set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS "${libraries}, libopencv-dev")
 set(CPACK_DEBIAN_DEV_DESCRIPTION "${summary}: headers
  For programs that use loopbit, with CMake or pkg-config.")
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME loopbit)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
-set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS
-    "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, libloopbit-fleet${abi} ${this}")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "${libraries}")
 set(CPACK_DEBIAN_TOOLS_DESCRIPTION "${summary}: the command
  Finds loops in image sequences, scores and shows them.")
 
@@ -91,7 +99,7 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 if(LOOPBIT_BUILD_PYTHON)
   math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
   string(CONCAT CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-         "libloopbit${abi} ${this}, libloopbit-map${abi} ${this}, libloopbit-images${abi} ${this}, libloopbit-poses${abi} ${this}, libloopbit-graph${abi} ${this}, libloopbit-data${abi} ${this}, libloopbit-fleet${abi} ${this}, python3-numpy, "
+         "${libraries}, python3-numpy, "
          "python3 (>= 3.${Python3_VERSION_MINOR}), python3 (<< 3.${next_minor})")
 endif()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS python3-matplotlib)
