@@ -475,7 +475,9 @@ class FleetTest(CommandTest):
         folder = self.scratch / "arriving"
         folder.mkdir()
         with subprocess.Popen([LOOPBIT, "query", " ".join(addresses), "--watch", folder, "--json", "--map-cache-mb",
-                               "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as query:
+                               "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as query, \
+                contextlib.ExitStack() as end:
+            end.callback(query.kill)    # a test that fails does not wait for it
             (folder / "a.png").symlink_to(images[HALF + 3])
             answer = json.loads(query.stdout.readline())
             self.assertNotIn("not_asked", answer)
