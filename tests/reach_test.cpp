@@ -125,11 +125,14 @@ std::vector<double> least_variances(const OdometryTrack& track, const Shortcuts&
     least.at(static_cast<std::size_t>(to)) =
         std::min(least.at(static_cast<std::size_t>(to)), by_it);
   };
+  std::vector<double> steps;
+  for (int frame = 0; frame < last; ++frame) {
+    steps.push_back(track.between(frame, frame + 1)->covariance(1, 1));
+  }
   for (int pass = 0; pass <= last; ++pass) {
     for (int frame = 0; frame < last; ++frame) {
-      const double step = track.between(frame, frame + 1)->covariance(1, 1);
-      shorten(frame, frame + 1, step);
-      shorten(frame + 1, frame, step);
+      shorten(frame, frame + 1, steps[static_cast<std::size_t>(frame)]);
+      shorten(frame + 1, frame, steps[static_cast<std::size_t>(frame)]);
     }
     for (const auto& [from, to] : shortcuts.ends()) shorten(from, to, apart_sq);
   }

@@ -356,7 +356,7 @@ TEST_F(TruthFileTest, CutOffFilesOfVersion73AreRefused) {
 
 TEST_F(TruthFileTest, DamagedFilesAreReadOrRefused) {
 #ifdef LOOPBIT_SANITIZED
-  constexpr int kEach = 250;  // Each is read in a process of its own.
+  constexpr int kEach = 250;  // A thousand take eight seconds.
 #else
   constexpr int kEach = 1000;
 #endif
