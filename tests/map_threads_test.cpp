@@ -3,6 +3,7 @@
 // A map is written by two threads, the detector's and its own, while others read the file. For the
 // thread sanitizer; links the detector only, so that it is built quickly.
 #include <atomic>
+#include <chrono>
 #include <memory>
 #include <string>
 #include <thread>
@@ -16,6 +17,7 @@
 #include "loopbit/map_tools.hpp"
 
 #include "batch_writer.hpp"
+#include "features_ahead.hpp"
 #include "file_database.hpp"
 #include "map_schema.hpp"
 #include "map_support.hpp"
@@ -160,6 +162,43 @@ TEST_F(MapThreads, PendingFeaturesAreGivenWhileTheyAreCommitted) {
   EXPECT_EQ(writer.pending(kFrames - 1), nullptr);
   EXPECT_EQ(writer.saved_frames(), kFrames);
   EXPECT_EQ(places_of(map_path).size(), std::size_t{kFrames});
+}
+
+/// A map with so many frames, whose keys are 1, 2 and so on.
+void write_frames(const std::string& map_path, int frames) {
+  loopbit::MapSession session;
+  session.session = 1;
+  BatchWriter writer(nullptr, std::move(session), 1, {}, {}, {.path = map_path});
+  for (int frame = 0; frame < frames; ++frame) {
+    writer.add({.content = content_of(frame),
+                .detection = {.frame = frame},
+                .features = std::make_shared<const Features>(few_features(frame))});
+  }
+  writer.flush();
+  writer.close();
+}
+
+TEST_F(MapThreads, FeaturesAlongAPathAreReadAhead) {
+  constexpr int kFrames = 40;
+  constexpr std::chrono::seconds kMost{60};
+  const std::string map_path = path("map.db");
+  write_frames(map_path, kFrames);
+  for (const int step : {1, -1, 3}) {
+    FeaturesAhead ahead(open_map(map_path, MapDatabase::Access::read));
+    const auto is_ahead = [&](std::int64_t place) {
+      const auto features = ahead.take(place, kMost);
+      if (!features) return false;
+      EXPECT_EQ(features->descriptors, few_features(static_cast<int>(place) - 1).descriptors);
+      return true;
+    };
+    EXPECT_FALSE(is_ahead(18));
+    EXPECT_FALSE(is_ahead(27));  // no path
+    int place = step > 0 ? 1 : kFrames;
+    EXPECT_FALSE(is_ahead(place));
+    EXPECT_FALSE(is_ahead(place += step));
+    while ((place += step) > 0 && place <= kFrames) EXPECT_TRUE(is_ahead(place)) << place;
+    EXPECT_FALSE(is_ahead(place));  // there is none
+  }
 }
 
 }  // namespace

@@ -293,7 +293,7 @@ void FleetStatement::bind(int number, double value) {
 }
 
 void FleetStatement::bind(int number, std::span<const unsigned char> bytes) {
-  set(number, std::string(bytes.begin(), bytes.end()));
+  set(number, std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size()));
 }
 
 void FleetStatement::bind(int number, std::string_view text) { set(number, std::string(text)); }

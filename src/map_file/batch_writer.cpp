@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "file_database.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -23,13 +25,13 @@ constexpr std::size_t kMaxPendingFrames = 256;
 
 BatchWriter::BatchWriter(std::unique_ptr<MapDatabase> database, MapSession session,
                          std::int64_t first_place, const OdometryDrift& drift,
-                         EncodeImage encode_image, BatchPace pace)
+                         EncodeImage encode_image, BatchOptions options)
     : database_(std::move(database)),
       session_(std::move(session)),
       first_place_(first_place),
       drift_(drift),
       encode_image_(std::move(encode_image)),
-      pace_(std::move(pace)),
+      options_(std::move(options)),
       thread_([this] { commit_batches(); }) {}
 
 BatchWriter::~BatchWriter() {
@@ -95,6 +97,7 @@ void BatchWriter::add_other(MapSession session) {
 }
 
 void BatchWriter::close() {
+  if (!database_) return;
   rows_.reset();
   database_->close();
   database_.reset();
@@ -104,7 +107,7 @@ void BatchWriter::commit_batches() {
   std::unique_lock lock(mutex_);
   while (!stop_) {
     added_.wait(lock, [&] { return stop_ || !pending_.empty() || !changes_.empty(); });
-    added_.wait_for(lock, pace_.max_delay,
+    added_.wait_for(lock, options_.max_delay,
                     [&] { return stop_ || in_a_hurry_ || pending_.size() >= kFramesPerBatch; });
     if (stop_) return;
     std::vector<AddedFrame> batch;
@@ -128,13 +131,14 @@ void BatchWriter::commit_batches() {
                      changes_.begin() + static_cast<std::ptrdiff_t>(changes.size()));
       saved_frames_ += static_cast<std::int64_t>(batch.size());
     }
-    if (!error_ && pace_.on_commit) pace_.on_commit();
+    if (!error_ && options_.on_commit) options_.on_commit();
     committed_.notify_all();
     if (error_) return;
   }
 }
 
 void BatchWriter::commit(const std::vector<AddedFrame>& batch, const Changes& changes) {
+  if (!database_) database_ = open_map(options_.path, MapDatabase::Access::write);
   const auto transaction = database_->begin();
   if (!rows_) rows_.emplace(*database_);
   if (!batch.empty()) {

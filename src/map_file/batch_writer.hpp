@@ -12,6 +12,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -30,19 +31,23 @@ struct AddedFrame {
   cv::Mat image = {};  ///< a copy; empty if no image is saved
 };
 
-/// How soon frames are committed, and what is then called on the writer's thread.
-struct BatchPace {
+/// How frames are committed.
+struct BatchOptions {
   std::chrono::milliseconds max_delay{1000};
-  std::function<void()> on_commit = {};
+  std::function<void()> on_commit = {};  ///< called on the writer's thread
+  /// Of the map file that is written if no database is given. It is opened on the writer's thread,
+  /// because that takes tens of milliseconds if it has to be made.
+  std::string path = {};
 };
 
 /// Commits the frames of one session in batches, on a thread of its own. The id of frame k's place
 /// is first_place + k. One thread at a time may call it.
 class BatchWriter {
  public:
-  /// `drift`: of odometry without covariances. `encode_image` may be empty.
+  /// `database`: null if `options` have a path. `drift`: of odometry without covariances.
+  /// `encode_image` may be empty.
   BatchWriter(std::unique_ptr<MapDatabase> database, MapSession session, std::int64_t first_place,
-              const OdometryDrift& drift, EncodeImage encode_image, BatchPace pace = {});
+              const OdometryDrift& drift, EncodeImage encode_image, BatchOptions options = {});
   /// Drops uncommitted frames.
   ~BatchWriter();
   BatchWriter(const BatchWriter&) = delete;
@@ -89,7 +94,7 @@ class BatchWriter {
   OdometryDrift drift_;
   std::optional<cv::Matx44d> last_pose_;  ///< by odometry, of the last frame that was added
   EncodeImage encode_image_;
-  BatchPace pace_;
+  BatchOptions options_;
 
   mutable std::mutex mutex_;  ///< guards all below
   std::condition_variable added_;

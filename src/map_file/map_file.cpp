@@ -25,6 +25,7 @@
 #include "loopbit/version.hpp"
 
 #include "batch_writer.hpp"
+#include "features_ahead.hpp"
 #include "file_database.hpp"
 #include "map_follower.hpp"
 #include "map_options.hpp"
@@ -260,6 +261,7 @@ class MapWriter::Impl {
     const bool is_whole = !upload_ || upload_->catch_up(is_stopped);
     if (upload_) end_upload();
     follower_.reset();
+    ahead_.reset();
     stored_.reset();
     own_features_.reset();
     own_file_.reset();
@@ -471,19 +473,20 @@ class MapWriter::Impl {
         [path = path_, options = options_](const MapSession& session) {
           check_same_shape(path, session.options, options);
         });
+    ahead_ = std::make_unique<FeaturesAhead>(open_map(path, MapDatabase::Access::read));
   }
 
   /// Of a map on a server, the file that queues its rows is made by the first call.
   BatchWriter& writer() {
     if (writer_) return *writer_;
-    auto file = open_map(queue_, MapDatabase::Access::write);
     upload_ = std::make_unique<SessionUpload>(std::move(server_), *database_, begun_, queue_);
     MapSession queued = begun_.session;
     queued.linked = false;
     writer_ = std::make_unique<BatchWriter>(
-        std::move(file), std::move(queued), begun_.first_place, options_.odometry, encode_image_,
-        BatchPace{.max_delay = kMaxQueued,
-                  .on_commit = [this] { upload_->wake(std::exchange(changes_, {})); }});
+        nullptr, std::move(queued), begun_.first_place, options_.odometry, encode_image_,
+        BatchOptions{.max_delay = kMaxQueued,
+                     .on_commit = [this] { upload_->wake(std::exchange(changes_, {})); },
+                     .path = queue_});
     for (const auto& [number, session] : sessions_) writer_->add_other(session);
     return *writer_;
   }
@@ -502,18 +505,29 @@ class MapWriter::Impl {
     const bool is_lost = upload_ && upload_->is_reader_lost();
     if (is_lost || waited_ >= kMaxWait) return missing();
     const auto begin = std::chrono::steady_clock::now();
-    database_->set_time_limit(
-        std::chrono::duration_cast<std::chrono::milliseconds>(kMaxWait - waited_));
-    std::shared_ptr<const Features> read;
-    try {
-      read = stored().get(place, damage_);
-    } catch (const Error&) {
-      (void)writer();  // whose upload reaches the server again
-      upload_->set_reader_lost();
-      read = missing();
+    std::shared_ptr<const Features> read = ahead_->take(stored().row(place), kMaxWait - waited_);
+    if (read) {
+      stored().keep(place, read);
+    } else {
+      read = fetch_now(place, begin);
     }
     waited_ += std::chrono::steady_clock::now() - begin;
     return read;
+  }
+
+  /// `begin`: of the wait for them.
+  std::shared_ptr<const Features> fetch_now(PlaceId place,
+                                            std::chrono::steady_clock::time_point begin) {
+    const auto left = kMaxWait - waited_ - (std::chrono::steady_clock::now() - begin);
+    database_->set_time_limit(
+        std::max(std::chrono::ceil<std::chrono::milliseconds>(left), std::chrono::milliseconds{1}));
+    try {
+      return stored().get(place, damage_);
+    } catch (const Error&) {
+      (void)writer();  // whose upload reaches the server again
+      upload_->set_reader_lost();
+      return missing();
+    }
   }
 
   std::shared_ptr<const Features> missing() {
@@ -576,6 +590,7 @@ class MapWriter::Impl {
   // Of a map on a server.
   std::int64_t epoch_ = 0;  ///< of the snapshot
   std::unique_ptr<MapFollower> follower_;
+  std::unique_ptr<FeaturesAhead> ahead_;
   std::string queue_;                      ///< the file; empty when the server has all of it
   std::unique_ptr<MapDatabase> own_file_;  ///< the same, for reading
   std::optional<FeatureReader> own_features_;

@@ -62,16 +62,15 @@ bool MapFollower::has_stopped() const {
 }
 
 void MapFollower::run() {
-  auto pause = kFirstPause;
+  RetryPause pause;
   while (!has_stopped()) {
     try {
       if (database_->is_lost()) database_->reconnect();
       follow();
-      pause = kFirstPause;
+      pause.reset();
     } catch (const Error&) {  // the upload says so
       std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, pause, [this] { return stop_; });
-      pause = std::min(2 * pause, kMaxPause);
+      changed_.wait_for(lock, pause.next(), [this] { return stop_; });
     }
   }
 }

@@ -610,6 +610,20 @@ std::optional<Features> FeatureReader::read(std::int64_t place, const SessionFra
   return features;
 }
 
+void for_each_features(const MapDatabase& database, const KeyRange& keys,
+                       const std::function<void(std::int64_t, Features)>& visit) {
+  const auto row = database.prepare(
+      "SELECT place, session, frame, features, features.checksum FROM features JOIN place USING "
+      "(place) WHERE place >= ?1 AND place <= ?2");
+  row->bind(1, keys.first);
+  row->bind(2, keys.last);
+  while (row->step()) {
+    const auto bytes = row->bytes(3);
+    if (!has_checksum(*row, 4, checksum_of(session_frame(*row, 1)).add(bytes))) continue;
+    if (auto features = features_from(bytes)) visit(row->integer(0), std::move(*features));
+  }
+}
+
 void for_each_image(const MapDatabase& database,
                     const std::function<void(std::int64_t, std::int64_t)>& visit, Damage& damage) {
   if (!has_images(database)) return;

@@ -129,6 +129,10 @@ class FeatureReader {
   std::unique_ptr<SqlStatement> row_;
 };
 
+/// Of the places with these keys, in no order. Leaves out what FeatureReader would.
+void for_each_features(const MapDatabase& database, const KeyRange& keys,
+                       const std::function<void(std::int64_t, Features)>& visit);
+
 /// Reads images by place.
 class ImageReader {
  public:

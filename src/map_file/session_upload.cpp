@@ -182,11 +182,11 @@ std::vector<std::string> SessionUpload::take_notices() {
 }
 
 void SessionUpload::run() {
-  auto pause = kFirstPause;
+  RetryPause pause;
   std::unique_lock lock(mutex_);
   while (true) {
     if (fault_) {
-      woken_.wait_for(lock, pause, [&] { return stop_ || in_a_hurry_; });
+      woken_.wait_for(lock, pause.next(), [&] { return stop_ || in_a_hurry_; });
     } else {
       woken_.wait(lock, [&] { return stop_ || copied_ < wakes_ || is_reader_lost_; });
     }
@@ -205,8 +205,10 @@ void SessionUpload::run() {
     lock.lock();
     is_trying_ = false;
     ++attempts_;
-    pause = fault_ ? std::min(2 * pause, kMaxPause) : kFirstPause;
-    if (!fault) copied_ = wakes;
+    if (!fault) {
+      copied_ = wakes;
+      pause.reset();
+    }
     if (!fault && (fault_ || was_lost)) ++reconnections_;
     note_change(fault);
     fault_ = fault;

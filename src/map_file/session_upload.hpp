@@ -25,7 +25,7 @@ class QueuedRows;
 
 /// Copies a session from the map file that queues it to a server, on a thread of its own, while the
 /// session is being written. What the server does not take stays in the file, and is tried again
-/// after 0.1 s and then in longer steps of up to 5 s. One other thread may call it.
+/// after 0.1 s and then in longer steps of up to 1 s. One other thread may call it.
 class SessionUpload {
  public:
   using Change = std::function<void(const MapDatabase&)>;

@@ -71,6 +71,8 @@ class StoredFeatures {
   /// Forgets the row of a place, and returns it.
   std::int64_t remove(PlaceId place) { return std::exchange(stored(place).id, kNoRow); }
 
+  [[nodiscard]] std::int64_t row(PlaceId place) { return stored(place).id; }
+
   [[nodiscard]] PlaceId size() const { return static_cast<PlaceId>(places_.size()); }
 
   /// Null if they would have to be read.
