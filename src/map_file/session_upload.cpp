@@ -145,8 +145,8 @@ void SessionUpload::set_reader_lost() {
 
 bool SessionUpload::catch_up(const std::function<bool()>& is_stopped) {
   std::unique_lock lock(mutex_);
-  // An attempt that has begun may have failed already.
-  const std::int64_t attempt = attempts_ + (is_trying_ ? 2 : 1);
+  // One that has begun may have failed already, and a server may end a connection once more.
+  const std::int64_t attempt = attempts_ + 2;
   in_a_hurry_ = true;
   woken_.notify_all();
   std::optional<std::chrono::steady_clock::time_point> end;
@@ -192,7 +192,6 @@ void SessionUpload::run() {
     }
     if (stop_) return;
     in_a_hurry_ = false;
-    is_trying_ = true;
     const std::int64_t wakes = wakes_;
     lock.unlock();
     std::optional<Error> fault;
@@ -203,7 +202,6 @@ void SessionUpload::run() {
       fault = error;
     }
     lock.lock();
-    is_trying_ = false;
     ++attempts_;
     if (!fault) {
       copied_ = wakes;

@@ -54,7 +54,7 @@ class SessionUpload {
   void wake(std::vector<Change> changes = {});
 
   /// Waits until the server has everything, and returns true. False, and the rest stays in the
-  /// file, after an attempt that failed, or as soon as `is_stopped`.
+  /// file, after two attempts that failed, or after one as soon as `is_stopped`.
   bool catch_up(const std::function<bool()>& is_stopped = {});
 
   /// Why the last attempt failed; none if it did not.
@@ -102,7 +102,6 @@ class SessionUpload {
   std::int64_t attempts_ = 0;  ///< that ended
   std::int64_t saved_frames_ = 0;
   int reconnections_ = 0;
-  bool is_trying_ = false;
   bool in_a_hurry_ = false;
   bool stop_ = false;
   std::thread thread_;  ///< last: it uses all the others
