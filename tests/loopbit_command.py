@@ -4,20 +4,17 @@
 
     NAME_test.py LOOPBIT [--quick] [unittest arguments]
 
---quick drives in fewer, wider steps, which suits a slow build; what is found is not judged then. Where
-the environment names a build of command_server.cpp in COMMAND_SERVER, that runs most calls, without
-loading all libraries again.
+--quick drives in fewer, wider steps, which suits a slow build; what is found is not judged then.
 """
 
-import atexit
 import csv
-import os
 import pathlib
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
+
+from served_command import run_command
 
 LOOPBIT = pathlib.Path(sys.argv.pop(1)).resolve()
 QUICK = "--quick" in sys.argv
@@ -29,41 +26,9 @@ WORLD = ["--frames", FRAMES, "--world", "laps=2", "--world", f"spacing_m={225 / 
          "--world", "width_px=320", "--world", "height_px=240"]
 
 
-class Server:
-    def __init__(self, program):
-        self.process = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        atexit.register(self.process.communicate)
-
-    def run(self, command, cwd, environment):
-        with tempfile.NamedTemporaryFile() as stdout, tempfile.NamedTemporaryFile() as stderr:
-            variables = [f"{name}={value}" for name, value in environment.items()]
-            strings = [cwd, stdout.name, stderr.name, str(len(variables)), *variables, *command]
-            request = b"".join(os.fsencode(text) + b"\0" for text in [str(len(strings)), *strings])
-            self.process.stdin.write(request)
-            self.process.stdin.flush()
-            code = int(self.process.stdout.readline())
-            return subprocess.CompletedProcess(command, code, stdout.read().decode(), stderr.read().decode())
-
-
-SERVER = Server(os.environ["COMMAND_SERVER"]) if "COMMAND_SERVER" in os.environ else None
-
-
-def loopbit(*arguments, environment=None, cwd=None, **options):
-    """Runs the command. Options are those of subprocess.run(), for which a process of its own is started
-    in any case."""
-    command = [str(LOOPBIT), *map(str, arguments)]
-    environment = environment or {}
-    if SERVER and not options:
-        return SERVER.run(command, cwd or os.getcwd(), environment)
-    return subprocess.run(
-        command,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        env={**os.environ, **environment},
-        cwd=cwd,
-        **options,
-    )
+def loopbit(*arguments, **options):
+    """Runs the command, see run_command()."""
+    return run_command(LOOPBIT, *arguments, **options)
 
 
 def complaints(ran):

@@ -6,11 +6,14 @@ LOOPBIT_DATA the folder of real images; what needs one that is not set is skippe
 import csv
 import os
 import pathlib
-import subprocess
+import sys
 
 import pytest
 
 import loopbit
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
+from served_command import run_command  # noqa: E402
 
 TIMES = ("content_ms", "retrieval_ms", "features_ms", "verification_ms")
 
@@ -23,8 +26,7 @@ def command():
         pytest.skip("LOOPBIT_COMMAND is not set")
 
     def call(*arguments):
-        result = subprocess.run([path, *map(str, arguments)], stdin=subprocess.DEVNULL,
-                                capture_output=True, text=True)
+        result = run_command(path, *arguments)
         assert result.returncode == 0, result.stderr
         return result.stdout
 

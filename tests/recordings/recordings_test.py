@@ -11,6 +11,7 @@ import pathlib
 import sqlite3
 import struct
 import subprocess
+import sys
 
 import genpy
 import numpy as np
@@ -22,6 +23,9 @@ from PIL import Image
 import loopbit
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.append(str(HERE.parent))
+from served_command import run_command  # noqa: E402
+
 LOOPBIT = os.environ["LOOPBIT_COMMAND"]
 TOPIC = "/camera/image_raw"
 START_S = 1_700_000_000
@@ -37,8 +41,7 @@ CREATE INDEX timestamp_idx ON messages (timestamp ASC);
 
 
 def loopbit_command(*arguments, code=0):
-    ran = subprocess.run([LOOPBIT, *map(str, arguments)], stdin=subprocess.DEVNULL,
-                         capture_output=True, text=True)
+    ran = run_command(LOOPBIT, *arguments)
     assert ran.returncode == code, ran.stderr
     return ran
 
