@@ -37,7 +37,7 @@ g++ -std=c++20 "$source/main.cpp" "${flags[@]}" -lopencv_imgcodecs -o "$scratch/
 
 # The components that are there, also where SQLite, zlib and pkg-config are not, which only some need.
 components() {
-  cmake -S "$source/components" -B "$scratch/components" -G Ninja --fresh \
+  cmake -S "$source/components" -B "$scratch/components" -G Ninja -U'CMAKE_DISABLE_FIND_PACKAGE_*' \
     -DCMAKE_PREFIX_PATH="$prefix" "$@" | tee "$scratch/found"
 }
 components

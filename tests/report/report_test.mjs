@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: MIT
 // The report page in a real browser:
 //
-//   node report_test.mjs [--report FILE [--run-json FILE]]... [--page FILE] [--playwright DIR]
-//                        [--screenshots DIR] [--opens FILE] [--exports DIR]
+//   node report_test.mjs [--report FILE [--run-json FILE]]... [--brief FILE [--run-json FILE]]...
+//                        [--page FILE] [--playwright DIR] [--screenshots DIR] [--opens FILE]
+//                        [--exports DIR]
 //
 // --report: a page as the command writes it, and the run.json it must agree with.
+// --brief: another one, which differs in its data: looks and keys are not tested again.
 // --page: the page before data is put into it; it is tested with made-up data of many kinds.
 // --opens: a page of which only that is asked: that it opens without a fault.
 // --exports: where judgements of the first report are saved as truth.csv and not_false.csv.
@@ -78,7 +80,8 @@ function argumentsOf(words) {
   for (let i = 0; i < words.length; i += 2) {
     const [name, value] = [words[i], words[i + 1]];
     assert.ok(value, `${name} needs a value`);
-    if (name === "--report") found.reports.push({ file: value, runJson: null });
+    if (["--report", "--brief"].includes(name))
+      found.reports.push({ file: value, runJson: null, isBrief: name === "--brief" });
     else if (name === "--run-json") found.reports.at(-1).runJson = value;
     else if (["--page", "--playwright", "--screenshots", "--opens", "--exports"].includes(name))
       found[name.slice(2)] = value;
@@ -229,12 +232,12 @@ async function checkOpens(browser, file) {
 /** A function for each report, which checks it in a browser. */
 function* checksOfReports({ reports, page, screenshots, opens, exports }, scratch) {
   if (opens) yield (browser) => checkOpens(browser, opens);
-  for (const [i, { file, runJson }] of reports.entries()) {
+  for (const [i, { file, runJson, isBrief }] of reports.entries()) {
     const record = runJson ? JSON.parse(readFileSync(runJson, "utf8")) : null;
     const name = path.basename(path.dirname(path.resolve(file)));
     const saved = i === 0 ? exports : null;
     yield (browser) =>
-      checkReport(browser, file, name, { runJson: record, screenshots, exports: saved });
+      checkReport(browser, file, name, { runJson: record, screenshots, exports: saved, isBrief });
   }
   if (!page) return;
   const template = readFileSync(page, "utf8");

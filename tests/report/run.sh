@@ -36,10 +36,10 @@ printf 'query,match\n' >"$scratch/no_revisit.csv"
 
 node "$here/report_test.mjs" --playwright "$root/build/page/node_modules" --page "$root/src/report/report.html" \
   --report "$scratch/demo/report.html" --run-json "$scratch/demo/run.json" \
-  --report "$scratch/second/report.html" --run-json "$scratch/second/run.json" \
+  --brief "$scratch/second/report.html" --run-json "$scratch/second/run.json" \
   --report "$scratch/mixed/report.html" --run-json "$scratch/mixed/run.json" \
-  --report "$scratch/corrected/report.html" --run-json "$scratch/corrected/run.json" \
-  --exports "$scratch" --report "$scratch/compared.html" --opens "$scratch/no_frames.html"
+  --brief "$scratch/corrected/report.html" --run-json "$scratch/corrected/run.json" \
+  --exports "$scratch" --brief "$scratch/compared.html" --opens "$scratch/no_frames.html"
 
 # What a person judged is truth for the command.
 "$loopbit" eval "$scratch/demo" --truth "$scratch/truth.csv" --not-false "$scratch/not_false.csv"
