@@ -65,6 +65,10 @@ std::string scene_schema() {
       object("foxglove.SpherePrimitive", {{"pose", pose}, {"size", vector}, {"color", colour}});
   const Json metadata =
       object("foxglove.KeyValuePair", {{"key", typed("string")}, {"value", typed("string")}});
+  const Json deletion =
+      object("foxglove.SceneEntityDeletion", {{"timestamp", time},
+                                              {"type", {{"type", "integer"}, {"enum", {0, 1}}}},
+                                              {"id", typed("string")}});
   const Json others = list_of(typed("object"));
   const Json entity = object("foxglove.SceneEntity", {{"timestamp", time},
                                                       {"frame_id", typed("string")},
@@ -80,7 +84,8 @@ std::string scene_schema() {
                                                       {"triangles", others},
                                                       {"texts", others},
                                                       {"models", others}});
-  return object("foxglove.SceneUpdate", {{"deletions", others}, {"entities", list_of(entity)}})
+  return object("foxglove.SceneUpdate",
+                {{"deletions", list_of(deletion)}, {"entities", list_of(entity)}})
       .dump();
 }
 
@@ -96,6 +101,15 @@ std::string image_schema() {
 std::string detection_schema() {
   const Json integer = typed("integer");
   const Json number = typed("number");
+  // Not every loop has a match in this session.
+  const auto add_match = [&](Json& schema) {
+    for (const char* name : {"match", "earlier_session", "earlier_frame"}) {
+      schema["properties"][name] = integer;
+    }
+  };
+  Json late =
+      object("loopbit.LateLoop", {{"frame", integer}, {"score", number}, {"similarity", number}});
+  add_match(late);
   const Json times =
       numbers("loopbit.StepTimes", {"content", "retrieval", "features", "verification", "total"});
   Json schema = object("loopbit.Detection", {{"timestamp", time_of("time")},
@@ -108,13 +122,13 @@ std::string detection_schema() {
                                              {"similarity", number},
                                              {"matches", integer},
                                              {"inliers", integer},
-                                             {"times_ms", times}});
+                                             {"times_ms", times},
+                                             {"late_loops", list_of(late)},
+                                             {"withdrawn_loops", list_of(late)}});
   // Not every frame has them.
   schema["properties"]["terms"] =
       numbers("loopbit.ScoreTerms", {"votes", "geometry", "path", "rivals", "prior"});
-  schema["properties"]["match"] = integer;
-  schema["properties"]["earlier_session"] = integer;
-  schema["properties"]["earlier_frame"] = integer;
+  add_match(schema);
   return schema.dump();
 }
 

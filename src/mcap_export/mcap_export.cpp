@@ -119,6 +119,26 @@ double finite(double value) {
   return std::isnan(value) ? 0.0 : std::clamp(value, -kMost, kMost);
 }
 
+/// `Found`: a Detection or a LateLoop.
+template <typename Found>
+void add_match(const Found& found, Json& json) {
+  if (found.match) json["match"] = *found.match;
+  if (found.earlier_match) {
+    json["earlier_session"] = found.earlier_match->session;
+    json["earlier_frame"] = found.earlier_match->frame;
+  }
+}
+
+Json late_json(const std::vector<LateLoop>& loops) {
+  Json list = Json::array();
+  for (const LateLoop& loop : loops) {
+    Json json{{"frame", loop.frame}, {"score", loop.score}, {"similarity", loop.similarity}};
+    add_match(loop, json);
+    list.push_back(json);
+  }
+  return list;
+}
+
 Json detection_json(const Detection& detection, double threshold, std::uint64_t time_ns) {
   const StepTimes& times = detection.times;
   Json json{{"timestamp", time_json(time_ns)},
@@ -144,12 +164,18 @@ Json detection_json(const Detection& detection, double threshold, std::uint64_t 
                      {"rivals", terms->rivals},
                      {"prior", terms->prior}};
   }
-  if (detection.match) json["match"] = *detection.match;
-  if (detection.earlier_match) {
-    json["earlier_session"] = detection.earlier_match->session;
-    json["earlier_frame"] = detection.earlier_match->frame;
-  }
+  add_match(detection, json);
+  json["late_loops"] = late_json(detection.late_loops);
+  json["withdrawn_loops"] = late_json(detection.withdrawn_loops);
   return json;
+}
+
+std::string loop_id(PlaceId frame) { return fmt::format("loop {}", frame); }
+
+/// Of what the entity with this id shows.
+Json deletion(const std::string& id, std::uint64_t time_ns) {
+  constexpr int kMatchingId = 0;
+  return {{"timestamp", time_json(time_ns)}, {"type", kMatchingId}, {"id", id}};
 }
 
 /// Writes the messages of one frame after the other.
@@ -192,7 +218,8 @@ class Export {
            {"format", "jpeg"}});
   }
 
-  /// The newest stretch of the path, the camera, and the loop if there is one.
+  /// The newest stretch of the path, the camera, the loop if there is one, and what changed of
+  /// earlier frames.
   Json scene(const Detection& detection, std::uint64_t time_ns) {
     Json entities = Json::array();
     const Place& at = place(detection.frame);
@@ -211,19 +238,30 @@ class Export {
         ++stretches_;
       }
     }
-    const bool is_loop = detection.status == Status::loop && detection.match;
-    const Place matched = is_loop ? place(*detection.match) : std::nullopt;
-    if (at && matched) {
-      const bool is_wrong =
-          judge_ && judge_->judge(detection.frame, *detection.match) == Judgement::wrong;
-      Json loop = entity(fmt::format("loop {}", detection.frame), time_ns);
-      loop["lines"].push_back(
-          line_json({*at, *matched}, 1.5, is_wrong ? kWrongColour : kLoopColour));
-      loop["metadata"] = {{{"key", "match"}, {"value", std::to_string(*detection.match)}},
-                          {{"key", "score"}, {"value", fmt::format("{}", detection.score)}}};
-      entities.push_back(loop);
+    if (detection.status == Status::loop) {
+      add_loop(detection.frame, detection.match, detection.score, time_ns, entities);
     }
-    return {{"deletions", Json::array()}, {"entities", entities}};
+    Json deletions = Json::array();
+    for (const LateLoop& loop : detection.withdrawn_loops) {
+      deletions.push_back(deletion(loop_id(loop.frame), time_ns));
+    }
+    for (const LateLoop& loop : detection.late_loops) {
+      add_loop(loop.frame, loop.match, loop.score, time_ns, entities);
+    }
+    return {{"deletions", deletions}, {"entities", entities}};
+  }
+
+  void add_loop(PlaceId frame, const std::optional<PlaceId>& match, double score,
+                std::uint64_t time_ns, Json& entities) const {
+    const Place& at = place(frame);
+    const Place matched = match ? place(*match) : std::nullopt;
+    if (!at || !matched) return;
+    const bool is_wrong = judge_ && judge_->judge(frame, *match) == Judgement::wrong;
+    Json loop = entity(loop_id(frame), time_ns);
+    loop["lines"].push_back(line_json({*at, *matched}, 1.5, is_wrong ? kWrongColour : kLoopColour));
+    loop["metadata"] = {{{"key", "match"}, {"value", std::to_string(*match)}},
+                        {{"key", "score"}, {"value", fmt::format("{}", score)}}};
+    entities.push_back(loop);
   }
 
   [[nodiscard]] const Place& place(PlaceId frame) const {

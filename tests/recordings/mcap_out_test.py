@@ -32,13 +32,26 @@ def on(read, topic):
     return [each["message"] for each in read["messages"] if each["topic"] == f"/loopbit/{topic}"]
 
 
+def rows_of(path):
+    with open(path, newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def walk(folder, *world):
+    """A run in the built-in world, with poses, truth and times, and its MCAP file."""
+    loopbit_command("demo", *TOWN, *world, "--out", folder / "run", "--mcap-out", folder / "out.mcap")
+    return folder, read_back(folder / "out.mcap"), rows_of(folder / "run/loops.csv")
+
+
 @pytest.fixture(scope="module")
 def town(tmp_path_factory):
-    """A run in the built-in world, with poses, truth and times, and its MCAP file."""
-    folder = tmp_path_factory.mktemp("town")
-    loopbit_command("demo", *TOWN, "--out", folder / "run", "--mcap-out", folder / "out.mcap")
-    with open(folder / "run/loops.csv", newline="") as file:
-        return folder, read_back(folder / "out.mcap"), list(csv.DictReader(file))
+    return walk(tmp_path_factory.mktemp("town"))
+
+
+@pytest.fixture(scope="module")
+def twins(tmp_path_factory):
+    """Houses that look alike: some loops are found late, and some are withdrawn."""
+    return walk(tmp_path_factory.mktemp("twins"), "--seed", "23", "--world", "look_alike=1")
 
 
 def test_detections_are_those_of_loops_csv(town):
@@ -58,18 +71,50 @@ def test_detections_are_those_of_loops_csv(town):
     assert times == sorted(times)
 
 
-def test_each_loop_is_a_line_between_its_places(town):
-    folder, read, rows = town
-    with open(folder / "run/positions.csv", newline="") as file:
-        places = {row["frame"]: [float(row[axis]) for axis in ("x_m", "y_m", "z_m")]
-                  for row in csv.DictReader(file)}
-    lines = {entity["id"]: entity["lines"][0]["points"] for scene in on(read, "scene")
-             for entity in scene["entities"] if entity["id"].startswith("loop ")}
-    loops = [row for row in rows if row["status"] == "loop"]
-    assert len(loops) > 20 and len(lines) == len(loops)
-    for row in loops:
-        ends = [[point[axis] for axis in "xyz"] for point in lines[f"loop {row['frame']}"]]
-        assert ends == [pytest.approx(places[row["frame"]]), pytest.approx(places[row["match"]])]
+def shown_loops(scenes):
+    """What the viewer draws at the end: the ends of each loop's line."""
+    shown = {}
+    for scene in scenes:
+        for deletion in scene["deletions"]:
+            del shown[deletion["id"]]  # fails if nothing is shown by this name
+        for entity in scene["entities"]:
+            if entity["id"].startswith("loop "):
+                shown[entity["id"]] = [[point[axis] for axis in "xyz"] for point in entity["lines"][0]["points"]]
+    return shown
+
+
+def changes_of(folder, kind):
+    rows = rows_of(folder / "run/late_loops.csv")
+    return [(row["frame"], row["match"]) for row in rows if row["kind"] == kind]
+
+
+@pytest.mark.parametrize("run", ["town", "twins"])
+def test_each_loop_is_a_line_between_its_places(run, request):
+    folder, read, rows = request.getfixturevalue(run)
+    places = {row["frame"]: [float(row[axis]) for axis in ("x_m", "y_m", "z_m")]
+              for row in rows_of(folder / "run/positions.csv")}
+    loops = {row["frame"]: row["match"] for row in rows if row["status"] == "loop"}
+    assert len(loops) > 20
+    for change in rows_of(folder / "run/late_loops.csv"):
+        if change["kind"] == "withdrawn":
+            del loops[change["frame"]]
+        else:
+            loops[change["frame"]] = change["match"]
+    assert shown_loops(on(read, "scene")) == {
+        f"loop {frame}": [pytest.approx(places[frame]), pytest.approx(places[match])]
+        for frame, match in loops.items()}
+
+
+def test_detections_tell_what_changed_of_earlier_frames(twins):
+    folder, read, _ = twins
+    for kind in ("late", "withdrawn"):
+        told = [(str(loop["frame"]), str(loop["match"]))
+                for detection in on(read, "detection") for loop in detection[f"{kind}_loops"]]
+        assert told == changes_of(folder, kind) != []
+
+
+def test_the_path_is_drawn_in_stretches(town):
+    _, read, rows = town
     path = {entity["id"]: entity["lines"][0]["points"] for scene in on(read, "scene")
             for entity in scene["entities"] if entity["id"].startswith("path ")}
     # Stretches share their ends.
