@@ -31,7 +31,8 @@ _STEPS = ("content_ms", "retrieval_ms", "features_ms", "verification_ms")
 def log(run: FinishedRun, recording: Any = None) -> None:
     """Logs each frame of a run at its number on the timeline "frame", and on "time" if all have one:
     the path so far and the loop under loopbit/scene, its picture and its match's under loopbit/query
-    and loopbit/match, score and times as plots.
+    and loopbit/match, score and times as plots. Late loops appear, and withdrawn ones disappear, at
+    the frame that reports them.
 
     recording: a rerun.RecordingStream; None is the global one of rerun.init().
 
@@ -65,13 +66,14 @@ def _shown(sdk: Any, found: Any, places: numpy.typing.NDArray[Any], pictures: _P
         yield f"scene/path/{frame}", sdk.LineStrips3D([[places[frame - 1], at]], colors=[_PATH])
     if (picture := pictures.jpeg(frame)) is not None:
         yield "query", sdk.EncodedImage(contents=picture, media_type="image/jpeg")
-    if found.status != Status.loop or found.match is None:
-        return
-    if numpy.isfinite([at, places[found.match]]).all():
-        line = [[at, places[found.match]]]
-        yield f"scene/loops/{frame}", sdk.LineStrips3D(line, colors=[_LOOP])
-    if (picture := pictures.jpeg(found.match)) is not None:
-        yield "match", sdk.EncodedImage(contents=picture, media_type="image/jpeg")
+    for loop in found.withdrawn_loops:
+        yield f"scene/loops/{loop.frame}", sdk.Clear(recursive=False)
+    for loop in [found, *found.late_loops] if found.status == Status.loop else found.late_loops:
+        if loop.match is not None and numpy.isfinite(ends := places[[loop.frame, loop.match]]).all():
+            yield f"scene/loops/{loop.frame}", sdk.LineStrips3D([ends], colors=[_LOOP])
+    if found.status == Status.loop and found.match is not None:
+        if (picture := pictures.jpeg(found.match)) is not None:
+            yield "match", sdk.EncodedImage(contents=picture, media_type="image/jpeg")
 
 
 def _places(run: FinishedRun) -> numpy.typing.NDArray[Any]:

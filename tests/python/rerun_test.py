@@ -37,6 +37,10 @@ class StandIn(types.ModuleType):
         return np.asarray(strips[0])
 
     @staticmethod
+    def Clear(*, recursive):
+        assert not recursive
+
+    @staticmethod
     def EncodedImage(*, contents, media_type):
         assert media_type == "image/jpeg" and contents[:2] == b"\xff\xd8"
         return contents
@@ -56,11 +60,28 @@ def test_each_frame_and_loop_is_logged(run, sdk):
     assert loops
     pictures = dict(sdk.at("loopbit/query"))
     for found in loops:
-        [(frame, line)] = sdk.at(f"loopbit/scene/loops/{found.frame}")
+        frame, line = sdk.at(f"loopbit/scene/loops/{found.frame}")[0]
         assert frame == found.frame
         np.testing.assert_allclose(line, run.positions_m[[found.frame, found.match]])
     assert sdk.at("loopbit/match") == [
         (found.frame, pictures[found.match]) for found in loops if found.match in pictures]
+
+
+def test_what_later_frames_change_is_logged_at_theirs(run, sdk):
+    def late(frame, match):
+        return types.SimpleNamespace(frame=frame, match=match)
+
+    last = run.detections[-1]
+    found = types.SimpleNamespace(frame=last.frame, timestamp_s=None, status=loopbit.Status.few_matches,
+                                  match=None, score=0.5, times=last.times,
+                                  late_loops=[late(5, 1), late(6, None)], withdrawn_loops=[late(7, 2)])
+    loopbit.rerun.log(types.SimpleNamespace(
+        path=run.path, detections=[found], positions_m=run.positions_m))
+    [(frame, line)] = sdk.at("loopbit/scene/loops/5")
+    assert frame == found.frame
+    np.testing.assert_allclose(line, run.positions_m[[5, 1]])
+    assert sdk.at("loopbit/scene/loops/6") == []  # its match is a frame of another session
+    assert sdk.at("loopbit/scene/loops/7") == [(found.frame, None)]
 
 
 def test_without_the_sdk_an_error_names_it(run, monkeypatch):
