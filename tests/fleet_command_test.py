@@ -464,10 +464,33 @@ class FleetTest(CommandTest):
         twice = f"{addresses[0]} {addresses[0]}"
         self.assert_fails(loopbit("query", twice, images[0]), 2, "Session 1 is in", "--first-session")
         self.assert_fails(loopbit("query", " ".join(addresses), images[0], "--epoch", "1"), 2, "one address")
-        for command in (("map", "info"), ("map", "create"), ("run", self.images, "--map")):
+        for command in (("map", "export"), ("map", "create"), ("run", self.images, "--map")):
             ran = loopbit(*command, " ".join((dead, addresses[0])), cwd=self.scratch)
             self.assert_fails(ran, 2, "are several maps", shown)
             self.assertNotIn("secret", ran.stdout + ran.stderr)
+
+    def test_several_servers_are_shown_together(self):
+        addresses, _ = self.new_shards()
+        paths = [self.server.address(f"shard{number}", password=None) for number in (1, 2)]
+        dead = "postgresql://robot1:secret@127.0.0.1:1/town"
+        for with_dead in (False, True):
+            given = " ".join([dead] * with_dead + addresses)
+
+            def shown(*command):
+                ran = loopbit("map", *command)
+                self.assertEqual(ran.returncode, 3 if with_dead else 0, ran.stderr)
+                self.assertRegex(ran.stderr, "^loopbit: 'postgresql://robot1@127.0.0.1:1/town' cannot be read "
+                                 ".*refused.*\n$" if with_dead else "^$")
+                return ran.stdout
+
+            self.assertEqual([info["path"] for info in json.loads(shown("info", given, "--json"))], paths)
+            self.assertTrue(all(path in shown("info", given) for path in paths))
+            sessions = json.loads(shown("list", given, "--json"))
+            self.assertEqual([session["session"] for session in sessions], [1, 2])
+            self.assertEqual(len(shown("list", given).splitlines()), 3)
+            whole = [line for address in addresses for line in self.lines("map", "check", address)]
+            lines = [line for line in shown("check", given).splitlines() if not line.startswith("map ")]
+            self.assertEqual(lines, whole)
 
     def test_a_server_that_is_lost_during_queries_is_named(self):
         addresses, _ = self.new_shards()

@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -62,7 +64,25 @@ void tell_unlinked(const MapReader& map) {
              printable(map.path()));
 }
 
-void info_command(const std::string& path, bool json) {
+/// Calls `show` for each map in `path`. Of several, those that cannot be read are named and left
+/// out. Returns the exit code.
+int for_each_map(const std::string& path, const std::function<void(const std::string&)>& show) {
+  const std::vector<std::string> all = addresses_in(path);
+  int exit_code = success;
+  for (const std::string& one : all) {
+    try {
+      show(one);
+    } catch (const Error& error) {
+      if (all.size() == 1 || error.kind() != ErrorKind::input) throw;
+      tell(fmt::format("loopbit: {}\n", error.what()));
+      exit_code = bad_input;
+    }
+  }
+  return exit_code;
+}
+
+/// Prints a summary of one map, or adds it to `json` unless that is null.
+void show_info(const std::string& path, Json* json) {
   MapReader map(path);
   const std::int64_t places = sum(places_of(map));
   const std::int64_t loops = sum(loops_of(map));
@@ -85,7 +105,7 @@ void info_command(const std::string& path, bool json) {
               {"image_bytes", images.bytes},
               {"options", nullptr}};
     if (!map.sessions().empty()) info["options"] = Json::parse(to_json(map.options()));
-    fmt::print("{}\n", dump(info));
+    json->push_back(std::move(info));
   } else {
     fmt::print("map        {}, {:.1f} MB", printable(map.path()), static_cast<double>(bytes) / 1e6);
     if (places > 0)
@@ -109,33 +129,50 @@ void info_command(const std::string& path, bool json) {
   warn_of_damage(map);
 }
 
-void list_command(const std::string& path, bool json) {
+int info_command(const std::string& path, bool json) {
+  Json all = Json::array();
+  const int exit_code =
+      for_each_map(path, [&](const std::string& one) { show_info(one, json ? &all : nullptr); });
+  if (json) fmt::print("{}\n", dump(addresses_in(path).size() == 1 ? all.front() : all));
+  return exit_code;
+}
+
+/// Prints the sessions of one map, or adds them to `json` unless that is null.
+void show_sessions(const std::string& path, Json* json, bool& has_heading) {
   MapReader map(path);
   Counts places = places_of(map);
   Counts loops = loops_of(map);
-  Json list = Json::array();
-  if (!json) {
+  if (!json && !std::exchange(has_heading, true)) {
     fmt::print("{:>7}  {:<20}  {:>9}  {:>9}  {:>9}  {:<32}  {}\n", "session", "started", "frames",
                "places", "loops", "uid", "name");
   }
   for (const MapSession& s : map.sessions()) {
     if (json) {
-      list.push_back({{"session", s.session},
-                      {"name", s.name},
-                      {"started", s.started},
-                      {"frames", s.frames},
-                      {"places", places[s.session]},
-                      {"loops", loops[s.session]},
-                      {"linked", s.linked},
-                      {"uid", s.uid},
-                      {"loopbit", s.loopbit}});
+      json->push_back({{"session", s.session},
+                       {"name", s.name},
+                       {"started", s.started},
+                       {"frames", s.frames},
+                       {"places", places[s.session]},
+                       {"loops", loops[s.session]},
+                       {"linked", s.linked},
+                       {"uid", s.uid},
+                       {"loopbit", s.loopbit}});
     } else {
       fmt::print("{:>7}  {:<20}  {:>9}  {:>9}  {:>9}  {:<32}  {}\n", s.session, s.started, s.frames,
                  places[s.session], loops[s.session], s.uid, printable(s.name));
     }
   }
-  if (json) fmt::print("{}\n", dump(list));
   warn_of_damage(map);
+}
+
+int list_command(const std::string& path, bool json) {
+  Json all = Json::array();
+  bool has_heading = false;
+  const int exit_code = for_each_map(path, [&](const std::string& one) {
+    show_sessions(one, json ? &all : nullptr, has_heading);
+  });
+  if (json) fmt::print("{}\n", dump(all));
+  return exit_code;
 }
 
 void merge_command(const std::string& into, const std::vector<std::string>& others) {
@@ -185,7 +222,7 @@ void images_command(const std::string& path, const std::string& folder) {
   warn_of_damage(map);
 }
 
-int check_command(const std::string& path, const std::string& recover) {
+int check_one(const std::string& path, const std::string& recover) {
   const MapCheck check = recover.empty() ? check_map(path) : recover_map(path, recover);
   for (const std::string& clause : check.damage) fmt::print("damaged    {}\n", clause);
   fmt::print("whole      {} sessions, {} places, {} loops, {} images\n", check.sessions,
@@ -199,6 +236,17 @@ int check_command(const std::string& path, const std::string& recover) {
                without_secrets(path));
   }
   return check.damage.empty() ? success : bad_input;
+}
+
+int check_command(const std::string& path, const std::string& recover) {
+  if (!recover.empty()) return check_one(path, recover);
+  int damaged = success;
+  const bool are_several = addresses_in(path).size() > 1;
+  const int missing = for_each_map(path, [&](const std::string& one) {
+    if (are_several) fmt::print("map        {}\n", printable(without_secrets(one)));
+    damaged = std::max(damaged, check_one(one, recover));
+  });
+  return std::max(damaged, missing);
 }
 
 void create_command(const std::string& address, int first_session) {
@@ -233,21 +281,24 @@ struct MapFlags {
 
 using Flags = std::shared_ptr<MapFlags>;
 
-CLI::App* add_command(CLI::App& map, const Flags& flags, const char* name, const char* what) {
+CLI::App* add_command(CLI::App& map, const Flags& flags, const char* name, const char* what,
+                      const char* which = "A map written by 'loopbit run --map', or its address") {
   CLI::App* command = map.add_subcommand(name, what);
-  command->add_option("MAP", flags->map, "A map written by 'loopbit run --map', or its address")
-      ->required();
+  command->add_option("MAP", flags->map, which)->required();
   return command;
 }
 
-void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
-  CLI::App* info = add_command(map, flags, "info", "Print a summary of a map");
-  info->add_flag("--json", flags->json, "Print JSON");
-  info->callback([flags] { info_command(flags->map, flags->json); });
+constexpr const char* kOneOrSeveral =
+    "A map written by 'loopbit run --map', or its address, or several addresses in one argument";
 
-  CLI::App* list = add_command(map, flags, "list", "List the sessions of a map");
+void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
+  CLI::App* info = add_command(map, flags, "info", "Print a summary of a map", kOneOrSeveral);
+  info->add_flag("--json", flags->json, "Print JSON");
+  info->callback([flags, &exit_code] { exit_code = info_command(flags->map, flags->json); });
+
+  CLI::App* list = add_command(map, flags, "list", "List the sessions of a map", kOneOrSeveral);
   list->add_flag("--json", flags->json, "Print JSON");
-  list->callback([flags] { list_command(flags->map, flags->json); });
+  list->callback([flags, &exit_code] { exit_code = list_command(flags->map, flags->json); });
 
   CLI::App* export_loops = add_command(map, flags, "export", "Export the loops");
   const std::map<std::string, ExportFormat> formats{
@@ -268,7 +319,8 @@ void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
       ->required();
   images->callback([flags] { images_command(flags->map, flags->out); });
 
-  CLI::App* check = add_command(map, flags, "check", "Read every byte, and list the damage");
+  CLI::App* check =
+      add_command(map, flags, "check", "Read every byte, and list the damage", kOneOrSeveral);
   check->add_option("--recover", flags->recover, "Copy all undamaged rows to a new map")
       ->type_name("NEW.db");
   check->callback([flags, &exit_code] { exit_code = check_command(flags->map, flags->recover); });

@@ -48,7 +48,8 @@ std::size_t find_address(const std::string& text) {
 const std::string& one_address(const std::string& path) {
   if (addresses_in(path).size() == 1) return path;
   throw Error(ErrorKind::option,
-              fmt::format("'{}' are several maps, which only 'loopbit query' takes; give one.",
+              fmt::format("'{}' are several maps, which only 'loopbit query' and 'loopbit map "
+                          "info|list|check' take; give one.",
                           without_secrets(path)));
 }
 
