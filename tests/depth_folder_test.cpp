@@ -269,9 +269,9 @@ void expect_matched(const std::string& folder) {
 
 TEST_F(DepthFolderTest, ARunWithDepthMeasuresMetres) {
   WorldOptions options;
-  options.frames = 150;
+  options.frames = 84;
   options.laps = 2;
-  options.spacing_m = 1.5;
+  options.spacing_m = 2.6;
   options.width_px = 320;
   options.height_px = 240;
   const World world(options);
@@ -308,9 +308,9 @@ class RightImagesTest : public DepthFolderTest {
   /// A drive past the same houses twice, with the images of a right camera in "right".
   [[nodiscard]] World drive() const {
     WorldOptions options;
-    options.frames = 150;
+    options.frames = 84;
     options.laps = 2;
-    options.spacing_m = 1.5;
+    options.spacing_m = 2.6;
     options.width_px = 320;
     options.height_px = 240;
     World world(options);
