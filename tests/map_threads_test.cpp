@@ -201,5 +201,23 @@ TEST_F(MapThreads, FeaturesAlongAPathAreReadAhead) {
   }
 }
 
+TEST_F(MapThreads, NothingIsReadAheadWhileTheMapCannotBeRead) {
+  constexpr std::chrono::seconds kMost{60};
+  const std::string map_path = path("map.db");
+  write_frames(map_path, 40);
+  FeaturesAhead ahead(open_map(map_path, MapDatabase::Access::read));
+  change(map_path, "ALTER TABLE features RENAME TO lost_features");
+  const auto begin = std::chrono::steady_clock::now();
+  for (int place = 1; place <= 20; ++place) EXPECT_EQ(ahead.take(place, kMost), nullptr) << place;
+  EXPECT_LT(std::chrono::steady_clock::now() - begin, kMost);
+  change(map_path, "ALTER TABLE lost_features RENAME TO features");
+  std::shared_ptr<const Features> features;
+  for (int place = 21; !features && place <= 40; ++place) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    features = ahead.take(place, kMost);
+  }
+  EXPECT_NE(features, nullptr);
+}
+
 }  // namespace
 }  // namespace loopbit::test

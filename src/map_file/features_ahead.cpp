@@ -40,15 +40,17 @@ std::shared_ptr<const Features> FeaturesAhead::take(std::int64_t place,
                                                     std::chrono::nanoseconds most) {
   std::unique_lock lock(mutex_);
   const std::int64_t number = place / kBlock;
-  Block* const block = find(number);
-  if (!block) {
-    want_around(place);
-    return nullptr;
-  }
-  read_.wait_for(lock, most, [&] { return is_away_ || block->is_read; });
-  auto features = std::exchange(block->features.at(static_cast<std::size_t>(place % kBlock)), {});
-  if (block->is_read && !features) {  // it was added since
-    std::erase_if(blocks_, [&](const Block& each) { return each.number == number; });
+  // The other thread drops the block if the server is lost.
+  read_.wait_for(lock, most, [&] {
+    const Block* const block = find(number);
+    return !block || block->is_read;
+  });
+  std::shared_ptr<const Features> features;
+  if (Block* const block = find(number); block && block->is_read) {
+    features = std::exchange(block->features.at(static_cast<std::size_t>(place % kBlock)), {});
+    if (!features) {  // it was added since
+      std::erase_if(blocks_, [&](const Block& each) { return each.number == number; });
+    }
   }
   want_around(place);
   return features;
