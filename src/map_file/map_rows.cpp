@@ -588,6 +588,18 @@ MapLoop loop_of(const LateLoop& loop, int session) {
           .similarity = loop.similarity};
 }
 
+namespace {
+
+/// Those in a column, whose checksum is in the next one; none if they are damaged.
+std::optional<Features> checked_features(const SqlStatement& row, int column,
+                                         const SessionFrame& at) {
+  const auto bytes = row.bytes(column);
+  if (!has_checksum(row, column + 1, checksum_of(at).add(bytes))) return std::nullopt;
+  return features_from(bytes);
+}
+
+}  // namespace
+
 FeatureReader::FeatureReader(const MapDatabase& database)
     : row_(database.prepare("SELECT features, checksum FROM features WHERE place = ?1")) {}
 
@@ -597,8 +609,7 @@ std::optional<Features> FeatureReader::read(std::int64_t place, const SessionFra
   row_->bind(1, place);
   std::optional<Features> features;
   if (row_->step_if_readable() == SqlStatement::Step::row) {
-    const auto bytes = row_->bytes(0);
-    if (has_checksum(*row_, 1, checksum_of(at).add(bytes))) features = features_from(bytes);
+    features = checked_features(*row_, 0, at);
   }
   row_->reset();  // ends the read, so that the log can be emptied
   if (!features) {
@@ -618,9 +629,8 @@ void for_each_features(const MapDatabase& database, const KeyRange& keys,
   row->bind(1, keys.first);
   row->bind(2, keys.last);
   while (row->step()) {
-    const auto bytes = row->bytes(3);
-    if (!has_checksum(*row, 4, checksum_of(session_frame(*row, 1)).add(bytes))) continue;
-    if (auto features = features_from(bytes)) visit(row->integer(0), std::move(*features));
+    auto features = checked_features(*row, 3, session_frame(*row, 1));
+    if (features) visit(row->integer(0), std::move(*features));
   }
 }
 

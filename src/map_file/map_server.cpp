@@ -49,7 +49,7 @@ const std::string& one_address(const std::string& path) {
   if (addresses_in(path).size() == 1) return path;
   throw Error(ErrorKind::option,
               fmt::format("'{}' are several maps, which only 'loopbit query' and 'loopbit map "
-                          "info|list|check' take; give one.",
+                          "info|list|check' (without --recover) take; give one.",
                           without_secrets(path)));
 }
 
