@@ -71,9 +71,10 @@ def _shown(sdk: Any, found: Any, places: numpy.typing.NDArray[Any], pictures: _P
     for loop in [found, *found.late_loops] if found.status == Status.loop else found.late_loops:
         if loop.match is not None and numpy.isfinite(ends := places[[loop.frame, loop.match]]).all():
             yield f"scene/loops/{loop.frame}", sdk.LineStrips3D([ends], colors=[_LOOP])
-    if found.status == Status.loop and found.match is not None:
-        if (picture := pictures.jpeg(found.match)) is not None:
-            yield "match", sdk.EncodedImage(contents=picture, media_type="image/jpeg")
+    if found.status != Status.loop or found.match is None:
+        return
+    if (picture := pictures.jpeg(found.match)) is not None:
+        yield "match", sdk.EncodedImage(contents=picture, media_type="image/jpeg")
 
 
 def _places(run: FinishedRun) -> numpy.typing.NDArray[Any]:

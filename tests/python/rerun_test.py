@@ -59,9 +59,11 @@ def test_each_frame_and_loop_is_logged(run, sdk):
     loops = [found for found in run.detections if found.is_loop and found.match is not None]
     assert loops
     pictures = dict(sdk.at("loopbit/query"))
+    changed = [loop.frame for found in run.detections for loop in (*found.late_loops, *found.withdrawn_loops)]
     for found in loops:
-        frame, line = sdk.at(f"loopbit/scene/loops/{found.frame}")[0]
+        (frame, line), *later = sdk.at(f"loopbit/scene/loops/{found.frame}")
         assert frame == found.frame
+        assert len(later) == changed.count(found.frame)
         np.testing.assert_allclose(line, run.positions_m[[found.frame, found.match]])
     assert sdk.at("loopbit/match") == [
         (found.frame, pictures[found.match]) for found in loops if found.match in pictures]
