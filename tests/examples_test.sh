@@ -1,12 +1,15 @@
 #!/usr/bin/env bash
 # Builds the examples against the loopbit installed in PREFIX, and runs them on the built-in world.
 #
-#   examples_test.sh PYTHON PREFIX SCRATCH
+#   examples_test.sh PYTHON PREFIX CONFIGURED SCRATCH
+#
+# CONFIGURED: the build of another program against PREFIX
 set -euo pipefail
 
 python=$1
 prefix=$2
-scratch=$3
+configured=$3
+scratch=$4
 examples=$(dirname "$(dirname "$(readlink -f "$0")")")/examples
 export PYTHONPATH=$prefix/lib/python3/dist-packages PYTHONDONTWRITEBYTECODE=1
 
@@ -15,7 +18,7 @@ mkdir -p "$scratch"
 "$prefix/bin/loopbit" demo --frames 150 --world spacing_m=1.5 --world laps=2 --world width_px=320 \
   --world height_px=240 --write-images "$scratch/town" 2>"$scratch/progress"
 
-cmake -S "$examples" -B "$scratch/build" -G Ninja -DCMAKE_PREFIX_PATH="$prefix"
+"$examples/../tests/configure_again" "$configured" "$examples" "$scratch/build"
 cmake --build "$scratch/build"
 "$scratch/build/keyframe_slam" "$scratch/town/images" | tee "$scratch/edges"
 grep -q '^edge [0-9]* -> [0-9]*, score' "$scratch/edges"

@@ -3,12 +3,13 @@
 # SPDX-License-Identifier: MIT
 """Runs what README.md shows, so that it stays true.
 
-    readme_blocks.py README PREFIX SCRATCH
+    readme_blocks.py README PREFIX CONFIGURED SCRATCH
 
 Every fenced block of the file README is tried, in order, in the folder SCRATCH/work:
   sh     is run by bash, with the loopbit installed in PREFIX first in PATH;
   python is a whole script, run with the Python module in PREFIX;
-  cpp    is a whole program: built against PREFIX with the consumer's CMakeLists.txt;
+  cpp    is a whole program: built against PREFIX with the consumer's CMakeLists.txt, which was
+         configured in CONFIGURED;
   cmake  is a whole CMakeLists.txt: builds the C++ program shown last;
   text   shows output or a sketch and is not run.
 Any other block is an error. A block that cannot be run here says why in the line before it:
@@ -23,7 +24,7 @@ import subprocess
 import sys
 from dataclasses import dataclass
 
-CONSUMER = pathlib.Path(__file__).resolve().parent / "consumer"
+TESTS = pathlib.Path(__file__).resolve().parent
 FENCE = re.compile(r"^(?P<indent> *)(?P<fence>`{3,}|~{3,}) *(?P<language>[^`\s]*)")
 SKIP = re.compile(r"^ *<!-- ci: skip (?P<reason>.*\S) -->$")
 
@@ -72,8 +73,8 @@ def run(command, **options):
 
 
 class Runner:
-    def __init__(self, prefix, scratch):
-        self.prefix = prefix
+    def __init__(self, prefix, configured, scratch):
+        self.prefix, self.configured = prefix, configured
         self.work = scratch / "work"
         self.program = scratch / "program"
         shutil.rmtree(scratch, ignore_errors=True)
@@ -94,7 +95,7 @@ class Runner:
         if "int main" not in text:
             raise BlockError("not a whole program")
         (self.program / "main.cpp").write_text(text)
-        cmake_lists = (CONSUMER / "CMakeLists.txt").read_text()
+        cmake_lists = (TESTS / "consumer/CMakeLists.txt").read_text()
         for header, library in (("loopbit/fleet_", "loopbit::fleet"), ("loopbit/map_", "loopbit::map")):
             if header in text:
                 cmake_lists = cmake_lists.replace("loopbit::loopbit", library)
@@ -110,8 +111,7 @@ class Runner:
     def build(self, cmake_lists):
         (self.program / "CMakeLists.txt").write_text(cmake_lists)
         build = self.program / "build"
-        prefix = f"-DCMAKE_PREFIX_PATH={self.prefix}"
-        run(["cmake", "--fresh", "-G", "Ninja", "-S", self.program, "-B", build, prefix])
+        run([TESTS / "configure_again", self.configured, self.program, build])
         run(["cmake", "--build", build])
 
     def text(self, text):
@@ -119,10 +119,10 @@ class Runner:
 
 
 def main():
-    if len(sys.argv) != 4:
+    if len(sys.argv) != 5:
         sys.exit(__doc__)
-    readme, prefix, scratch = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
-    runner = Runner(prefix, scratch)
+    readme, prefix, configured, scratch = (pathlib.Path(argument).resolve() for argument in sys.argv[1:])
+    runner = Runner(prefix, configured, scratch)
     actions = {"sh": runner.sh, "python": runner.python, "cpp": runner.cpp, "cmake": runner.cmake,
                "text": runner.text}
     number = 0

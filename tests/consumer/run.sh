@@ -35,10 +35,10 @@ if [[ " ${flags[*]} " =~ " -l"(sqlite3|deflate)" " ]]; then
 fi
 g++ -std=c++20 "$source/main.cpp" "${flags[@]}" -lopencv_imgcodecs -o "$scratch/by_pkg_config"
 
+"$source/../configure_again" "$scratch/build" "$source/components" "$scratch/components"
 # The components that are there, also where SQLite, zlib and pkg-config are not, which only some need.
 components() {
-  cmake -S "$source/components" -B "$scratch/components" -G Ninja -U'CMAKE_DISABLE_FIND_PACKAGE_*' \
-    -DCMAKE_PREFIX_PATH="$prefix" "$@" | tee "$scratch/found"
+  cmake -U'CMAKE_DISABLE_FIND_PACKAGE_*' "$@" "$scratch/components" | tee "$scratch/found"
 }
 components
 for component in loopbit images poses graph map fleet recordings data both; do

@@ -27,9 +27,10 @@ cmake -S "$scratch/loopbit-$version" -B "$scratch/configured" -G Ninja --log-lev
   -DLOOPBIT_BUILD_PYTHON=ON -DLOOPBIT_BUILD_CLI=ON -DLOOPBIT_BUILD_TESTS=OFF \
   -DLOOPBIT_BUILD_BENCHMARKS=OFF -DPython3_EXECUTABLE="$python"
 
-"$python" -m venv --system-site-packages "$scratch/venv"
+# Debian has pip.
+"$python" -m venv --system-site-packages --without-pip "$scratch/venv"
 PIP_NO_INDEX=1 PIP_DISABLE_PIP_VERSION_CHECK=1 LOOPBIT_BUILD_DIR=$build \
-  "$scratch/venv/bin/pip" install --quiet --no-build-isolation "$archive"
+  "$scratch/venv/bin/python" -m pip install --quiet --no-build-isolation "$archive"
 cd "$scratch"
 "$scratch/venv/bin/loopbit" demo --frames 60 --world spacing_m=4 --world width_px=160 \
   --world height_px=120 --write-images town 2>progress
