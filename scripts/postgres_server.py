@@ -6,6 +6,7 @@ free port of 127.0.0.1, by a user without privileges."""
 import contextlib
 import os
 import pathlib
+import random
 import select
 import shutil
 import signal
@@ -51,24 +52,29 @@ def programs_with(extension, folder):
 
 
 def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    """Below those that Linux gives to connections, one of which could take it while the server is away."""
+    while True:
+        port = random.randrange(10000, 32768)
+        with socket.socket() as probe, contextlib.suppress(OSError):    # it is taken
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
-def is_running(process):
+def state(process):
+    """As in proc(5): T for one that is stopped, Z for one that has ended, even if nothing of it is left."""
     try:
         status = pathlib.Path(f"/proc/{process}/stat").read_text()
     except FileNotFoundError:
-        return False
-    return status.rsplit(")", 1)[1].split()[0] != "Z"
+        return "Z"
+    return status.rsplit(")", 1)[1].split()[0]
 
 
 class PostgresServer:
     """A running server, whose superuser is "admin". With `safe`, commits are on disk. `extension`: the folder
-    of a build with loopbit.so and what belongs to it; the server has it then."""
+    of a build with loopbit.so and what belongs to it; the server has it then. `limit_s`: for a call of sql()."""
 
-    def __init__(self, safe=False, extension=None):
+    def __init__(self, safe=False, extension=None, limit_s=None):
+        self.limit_s = limit_s
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="loopbit_pg_"))
         self.data = self.folder / "data"
         self.port = free_port()
@@ -104,11 +110,16 @@ class PostgresServer:
     def processes(self):
         """Of the server, all of them stopped."""
         postmaster = int((self.data / "postmaster.pid").read_text().splitlines()[0])
-        os.kill(postmaster, signal.SIGSTOP)    # it begins no more
+        os.kill(postmaster, signal.SIGSTOP)
+        while state(postmaster) not in "TZ":    # it may be beginning one more
+            time.sleep(0.001)
         children = pathlib.Path(f"/proc/{postmaster}/task/{postmaster}/children").read_text().split()
+        stopped = [postmaster]
         for process in map(int, children):
-            os.kill(process, signal.SIGSTOP)
-        return [postmaster, *map(int, children)]
+            with contextlib.suppress(ProcessLookupError):    # it ended meanwhile
+                os.kill(process, signal.SIGSTOP)
+                stopped.append(process)
+        return stopped
 
     @contextlib.contextmanager
     def frozen(self):
@@ -125,7 +136,7 @@ class PostgresServer:
         processes = self.processes()
         for process in processes:
             os.kill(process, signal.SIGKILL)
-        while any(map(is_running, processes)):
+        while any(state(process) != "Z" for process in processes):
             time.sleep(0.01)
         # Their zombies would be taken for a server that runs.
         for lock in (self.data / "postmaster.pid", self.folder / f".s.PGSQL.{self.port}.lock"):
@@ -168,7 +179,8 @@ class PostgresServer:
         """What the statements print, without headings."""
         commands = [part for statement in statements for part in ("-c", statement)]
         return subprocess.run(["psql", "-X", "-q", "-A", "-t", "-v", "ON_ERROR_STOP=1", *commands,
-                               self.address(database)], check=True, capture_output=True, text=True).stdout
+                               self.address(database)], check=True, capture_output=True, text=True,
+                              timeout=self.limit_s).stdout
 
     def close(self):
         with contextlib.suppress(subprocess.CalledProcessError):

@@ -48,11 +48,14 @@ void redirect(int stream, const char* file, int flags) {
   close(opened);
 }
 
+constexpr unsigned kTimeLimit_s = 600;  ///< as in served_command.py
+
 [[noreturn]] void run(std::vector<std::string> request) {
   if (chdir(request[0].c_str()) != 0) std::abort();
   redirect(STDIN_FILENO, "/dev/null", O_RDONLY);
   redirect(STDOUT_FILENO, request[1].c_str(), O_WRONLY);
   redirect(STDERR_FILENO, request[2].c_str(), O_WRONLY);
+  alarm(kTimeLimit_s);
   const std::size_t arguments = 4 + std::stoul(request[3]);
   for (std::size_t i = 4; i < arguments; ++i) putenv(request[i].data());
   std::vector<char*> argv;

@@ -27,8 +27,9 @@ if sys.argv[2:3] == ["--search"]:
     del sys.argv[2:4]
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "scripts"))
 
-from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, decisions, loopbit    # noqa: E402
+from loopbit_command import FRAMES, QUICK, CommandTest, decisions, loopbit, started    # noqa: E402
 from postgres_server import ENCODED_PASSWORD, PASSWORD, PostgresServer    # noqa: E402
+from served_command import TIME_LIMIT_S    # noqa: E402
 
 HALF = FRAMES // 2
 # Longer than a server is away, which costs a slow build fewer frames.
@@ -46,7 +47,7 @@ class FleetTest(CommandTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.server = PostgresServer(extension=SEARCH)
+        cls.server = PostgresServer(extension=SEARCH, limit_s=TIME_LIMIT_S)
         cls.addClassCleanup(cls.server.close)
         cls.server.sql("postgres", "CREATE DATABASE town", "CREATE DATABASE copy", "CREATE DATABASE empty",
                        "CREATE DATABASE cpp")
@@ -87,7 +88,8 @@ class FleetTest(CommandTest):
 
     def test_program(self):
         environment = {**os.environ, "LOOPBIT_FLEET_ADDRESS": self.server.address("cpp")}
-        ran = subprocess.run([FLEET_MAP_TEST], env=environment, capture_output=True, text=True)
+        ran = subprocess.run([FLEET_MAP_TEST], env=environment, capture_output=True, text=True,
+                             timeout=TIME_LIMIT_S)
         self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
 
     def test_runs_answer_as_with_a_file(self):
@@ -218,9 +220,7 @@ class FleetTest(CommandTest):
     @contextlib.contextmanager
     def second_run(self, address, out, sessions=2, images=None):
         """The second session, stopped when the server has some of it."""
-        with subprocess.Popen([LOOPBIT, "run", images or self.long, "--map", address, "--out", out,
-                               "--no-report", "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                              text=True) as run:
+        with started("run", images or self.long, "--map", address, "--out", out, "--no-report", "--json") as run:
             name = address.rsplit("/", 1)[1]
             while self.server.sql(name, "SELECT count(*) FROM loopbit.session") != f"{sessions}\n":
                 self.assertIsNone(run.poll())
@@ -499,10 +499,7 @@ class FleetTest(CommandTest):
         images = sorted(self.images.iterdir())
         folder = self.scratch / "arriving"
         folder.mkdir()
-        with subprocess.Popen([LOOPBIT, "query", " ".join(addresses), "--watch", folder, "--json", "--map-cache-mb",
-                               "0"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as query, \
-                contextlib.ExitStack() as end:
-            end.callback(query.kill)    # a test that fails does not wait for it
+        with started("query", " ".join(addresses), "--watch", folder, "--json", "--map-cache-mb", 0) as query:
             (folder / "a.png").symlink_to(images[HALF + 3])
             answer = json.loads(query.stdout.readline())
             self.assertNotIn("not_asked", answer)

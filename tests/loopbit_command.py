@@ -7,14 +7,17 @@
 --quick drives in fewer, wider steps, which suits a slow build; what is found is not judged then.
 """
 
+import contextlib
 import csv
 import pathlib
 import shutil
+import subprocess
 import sys
 import tempfile
+import threading
 import unittest
 
-from served_command import run_command
+from served_command import TIME_LIMIT_S, run_command
 
 LOOPBIT = pathlib.Path(sys.argv.pop(1)).resolve()
 QUICK = "--quick" in sys.argv
@@ -29,6 +32,21 @@ WORLD = ["--frames", FRAMES, "--world", "laps=2", "--world", f"spacing_m={225 / 
 def loopbit(*arguments, **options):
     """Runs the command, see run_command()."""
     return run_command(LOOPBIT, *arguments, **options)
+
+
+@contextlib.contextmanager
+def started(*arguments):
+    """A process of the command, for a `with` block that talks to it. It is killed if it still runs at the end of the
+    block, even one that was stopped, or after TIME_LIMIT_S."""
+    with subprocess.Popen([LOOPBIT, *map(str, arguments)], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                          stderr=subprocess.PIPE, text=True) as process:
+        watchdog = threading.Timer(TIME_LIMIT_S, process.kill)
+        watchdog.start()
+        try:
+            yield process
+        finally:
+            watchdog.cancel()
+            process.kill()
 
 
 def complaints(ran):

@@ -19,7 +19,7 @@ import time
 import unittest
 import zlib
 
-from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, loopbit, rows
+from loopbit_command import FRAMES, LOOPBIT, QUICK, CommandTest, loopbit, rows, started
 
 LAP = FRAMES // 2
 
@@ -286,8 +286,7 @@ class MapCommandTest(CommandTest):
     def test_watch_answers_images_as_they_come(self):
         folder = self.scratch / "incoming"
         folder.mkdir()
-        with subprocess.Popen([LOOPBIT, "query", self.map, "--watch", folder, "--json"],
-                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True) as watch:
+        with started("query", self.map, "--watch", folder, "--json") as watch:
             for name in ("000004.png", "000009.png"):
                 shutil.copy(self.laps[0] / name, folder)
                 answer = json.loads(watch.stdout.readline())
@@ -300,9 +299,7 @@ class MapCommandTest(CommandTest):
         folder = self.scratch / "incoming"
         folder.mkdir()
         whole = (self.laps[0] / "000004.png").read_bytes()
-        with subprocess.Popen([LOOPBIT, "query", self.map, "--watch", folder, "--json"],
-                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                              stderr=subprocess.DEVNULL, text=True) as watch:
+        with started("query", self.map, "--watch", folder, "--json") as watch:
             for bytes_there, status in ((len(whole) // 2, "unreadable"), (len(whole), "loop")):
                 (folder / "slow.png").write_bytes(whole[:bytes_there])
                 self.assertEqual(json.loads(watch.stdout.readline())["status"], status)
@@ -312,9 +309,7 @@ class MapCommandTest(CommandTest):
     def test_watch_goes_on_when_an_image_is_gone_before_it_is_read(self):
         folder = self.few_images()
         first, *others = sorted(folder.iterdir())
-        with subprocess.Popen([LOOPBIT, "query", self.map, "--watch", folder, "--json"],
-                              stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                              stderr=subprocess.DEVNULL, text=True) as watch:
+        with started("query", self.map, "--watch", folder, "--json") as watch:
             self.assertEqual(json.loads(watch.stdout.readline())["image"], first.name)
             for image in reversed(others):
                 image.unlink()
@@ -453,8 +448,7 @@ class MapCommandTest(CommandTest):
         ended = set()
         for attempt in range(40):    # some come after its end
             shutil.copy(merged, copy)
-            with subprocess.Popen([LOOPBIT, "map", "link", copy], stdout=subprocess.PIPE,
-                                  stderr=subprocess.PIPE, text=True) as link:
+            with started("map", "link", copy) as link:
                 while link.poll() is None and not has_open(link.pid, copy):
                     time.sleep(0.001)
                 time.sleep(0.02 * (attempt // 2 % 5))

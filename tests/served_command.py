@@ -9,6 +9,9 @@ import subprocess
 import tempfile
 
 
+TIME_LIMIT_S = 600    # no call takes a tenth of it; one that hangs should fail under its name
+
+
 class Server:
     def __init__(self, program):
         self.process = subprocess.Popen([program], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -41,5 +44,5 @@ def run_command(program, *arguments, environment=None, cwd=None, **options):
         text=True,
         env={**os.environ, **environment},
         cwd=cwd,
-        **options,
+        **{"timeout": TIME_LIMIT_S, **options},
     )

@@ -96,6 +96,7 @@ constexpr std::chrono::milliseconds kSlice{20};
 /// The same, but null as soon as `is_interrupted`. Only PQconnectdbParams() tries all hosts of an
 /// address in time, and it cannot be interrupted; so it may go on, on a thread of its own.
 PGconn* connect(const Address& address, const std::atomic<bool>& is_interrupted) {
+  if (is_interrupted) return nullptr;
   using Handle = std::unique_ptr<PGconn, decltype(&PQfinish)>;
   std::promise<Handle> promise;
   std::future<Handle> connected = promise.get_future();
