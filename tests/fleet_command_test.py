@@ -463,8 +463,8 @@ class FleetTest(CommandTest):
         self.assertIn(f"not asked: {shown}", ran.stdout)
         self.assertNotIn("secret", ran.stdout + ran.stderr)
         self.assert_fails(loopbit("query", f"{dead} {dead}", images[0]), 3, "refused")
-        twice = f"{addresses[0]} {addresses[0]}"
-        self.assert_fails(loopbit("query", twice, images[0]), 2, "Session 1 is in", "--first-session")
+        self.assert_fails(loopbit("query", f"{addresses[0]} {self.town}", images[0]), 2, "Session 1 in",
+                          "is another one", "--first-session")
         self.assert_fails(loopbit("query", " ".join(addresses), images[0], "--epoch", "1"), 2, "one address")
         for command in (("map", "export"), ("map", "create"), ("run", self.images, "--map")):
             ran = loopbit(*command, " ".join((dead, addresses[0])), cwd=self.scratch)
@@ -494,6 +494,69 @@ class FleetTest(CommandTest):
             lines = [line for line in shown("check", given).splitlines() if not line.startswith("map ")]
             self.assertEqual(lines, whole)
 
+    def sessions(self, *addresses):
+        """The numbers of the sessions of each."""
+        return [[session["session"] for session in json.loads("\n".join(self.lines("map", "list", address, "--json")))]
+                for address in addresses]
+
+    def test_only_whole_sessions_move_and_by_the_owner_of_the_map(self):
+        (first, second), _ = self.new_shards()
+        move = ("map", "move", first, second, "--session", "1")
+        self.assert_fails(loopbit(*move[:2], self.file, *move[3:]), 2, "is a map file", "map merge")
+        self.assert_fails(loopbit(*move[:3], first, *move[4:]), 4, "is the map", "itself")
+        self.assert_fails(loopbit(*move[:5], "7"), 2, "has no session 7", "map list")
+        self.assert_fails(loopbit("map", "move", self.town, *move[3:4], "--session", "2"), 2, "is another one")
+        robot = self.server.address("shard1", "robot1")
+        self.assert_fails(loopbit("map", "move", robot, *move[3:]), 4, "only its owner")
+        self.server.sql("shard1", "CREATE TABLE public.whole AS SELECT * FROM loopbit.features",
+                        "UPDATE loopbit.features SET features = set_byte(features, 100, 255 - get_byte(features, 100)) "
+                        "WHERE place = (1::bigint << 32) + 3")
+        self.assert_fails(loopbit(*move), 3, "is damaged", f"place {(1 << 32) + 3}")
+        self.assertEqual(self.sessions(first, second), [[1], [2]])
+
+    def test_a_session_moves_to_another_server_whatever_is_killed(self):
+        (first, second), one = self.new_shards()
+        query = (sorted(self.images.iterdir())[HALF + 3], "--json", "--places", "30")
+        of_one = self.lines("query", one, *query)
+        move = ("map", "move", first, second, "--session", "1")
+        # After the copy, before the first one has removed the session.
+        self.server.sql("shard1", "UPDATE loopbit.session SET owner = 'robot1'",
+                        "CREATE FUNCTION public.wait() RETURNS trigger LANGUAGE plpgsql AS "
+                        "$$BEGIN PERFORM pg_sleep(600); RETURN NEW; END$$", "CREATE TRIGGER wait BEFORE INSERT ON "
+                        "loopbit.moved FOR EACH ROW EXECUTE FUNCTION public.wait()")
+        with started(*move) as moving:
+            sleeping = "SELECT count(*) FROM pg_stat_activity WHERE wait_event = 'PgSleep'"
+            while self.server.sql("shard1", sleeping) == "0\n":
+                self.assertIsNone(moving.poll())
+            self.server.kill()
+            self.server.start()
+            self.assertIn("can be reached", moving.communicate()[1])
+        self.server.sql("shard1", "DROP TRIGGER wait ON loopbit.moved")
+        self.assertEqual(self.sessions(first, second), [[1], [1, 2]])
+        for both in (f"{first} {second}", f"{second} {first}"):
+            self.assertEqual(self.lines("query", both, *query), of_one)
+
+        self.server.sql("shard2", "UPDATE loopbit.features SET features = set_byte(features, 100, 255 - "
+                        "get_byte(features, 100)) WHERE place = (1::bigint << 32) + 3")    # it is copied again
+        self.assertEqual(self.lines(*move)[0], f"moved      1 sessions, {HALF} places")
+        self.assertEqual(self.sessions(first, second), [[], [1, 2]])
+        for command in ("check", "export"):
+            self.assertEqual(sorted(self.lines("map", command, second)), sorted(self.lines("map", command, one)))
+        self.assertEqual(self.server.sql("shard2", "SELECT owner FROM loopbit.session WHERE session = 1"), "robot1\n")
+        self.assertIn("0 sessions, 0 places; 1 sessions were there already", self.lines(*move)[0])
+        self.assert_fails(loopbit("map", "merge", first, self.shared / "first.db"), 4,
+                          "session 1 was moved to another server")
+
+        back = ("map", "move", second, first, "--session", "1", "--session", "2")
+        with started(*back) as moving:
+            while moving.poll() is None:
+                for both in (f"{first} {second}", f"{second} {first}"):
+                    self.assertEqual(self.lines("query", both, *query), of_one)
+        self.assertEqual(self.sessions(first, second), [[1, 2], []])
+        self.server.sql("shard1", "SELECT setval('loopbit.session_number', 1, false)")
+        self.lines("map", "merge", first, self.file)    # whose sessions get numbers that are free
+        self.assertEqual(self.sessions(first), [[1, 2, 3, 4]])
+
     def test_a_server_that_is_lost_during_queries_is_named(self):
         addresses, _ = self.new_shards()
         images = sorted(self.images.iterdir())
@@ -513,12 +576,12 @@ class FleetTest(CommandTest):
         self.assertEqual(query.returncode, 3, stderr)
 
     def test_another_version_is_refused(self):
-        for version, remedy in (99, "newer loopbit"), (1, "'loopbit map merge COPY.db ADDRESS'"):
+        for version, remedy in (99, "newer loopbit"), (2, "'loopbit map merge COPY.db ADDRESS'"):
             self.server.sql("town", f"UPDATE loopbit.migration SET version = {version}")
             try:
                 self.assert_fails(loopbit("map", "info", self.town), 3, f"version {version}", remedy)
             finally:
-                self.server.sql("town", "UPDATE loopbit.migration SET version = 2")
+                self.server.sql("town", "UPDATE loopbit.migration SET version = 3")
 
     def as_robot2(self, statement):
         return subprocess.run(["psql", "-X", "-q", "-A", "-t", "-c", statement,

@@ -187,6 +187,15 @@ void merge_command(const std::string& into, const std::vector<std::string>& othe
   tell_unlinked(MapReader(into));
 }
 
+void move_command(const std::string& from, const std::string& to,
+                  const std::vector<int>& sessions) {
+  const MoveCounts counts = move_sessions(from, to, sessions);
+  fmt::print("moved      {} sessions, {} places", counts.sessions, counts.places);
+  if (counts.known > 0) fmt::print("; {} sessions were there already", counts.known);
+  fmt::print("\n");
+  tell_unlinked(MapReader(to));
+}
+
 int link_command(const std::string& path) {
   const auto& stop = stop_on_signal();
   std::optional<Progress> progress;
@@ -272,6 +281,8 @@ struct MapFlags {
   std::string map;
   bool json = false;
   std::vector<std::string> others;
+  std::string to;
+  std::vector<int> sessions;
   ExportFormat format = ExportFormat::csv;
   std::string out;
   std::string recover;
@@ -346,6 +357,16 @@ void add_writers(CLI::App& map, const Flags& flags, int& exit_code) {
                    "only what it lacks")
       ->required();
   merge->callback([flags] { merge_command(flags->map, flags->others); });
+
+  CLI::App* move =
+      add_command(map, flags, "move", "Move sessions from one PostgreSQL server to another",
+                  "The address of the map that has them");
+  move->add_option("TO", flags->to, "The address of the map that gets them")->required();
+  move->add_option("--session", flags->sessions, "A session to move; may be repeated")
+      ->type_name("SESSION")
+      ->allow_extra_args(false)
+      ->required();
+  move->callback([flags] { move_command(flags->map, flags->to, flags->sessions); });
 
   CLI::App* link = add_command(map, flags, "link",
                                "Find the loops between sessions that never met, such as those of "

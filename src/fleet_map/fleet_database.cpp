@@ -25,6 +25,7 @@ constexpr std::int64_t kRowsAtOnce = 1024;
 constexpr const char* kLockNumbers = "SELECT pg_advisory_xact_lock(1819242352, -1)";
 constexpr const char* kLockLinks = "SELECT pg_try_advisory_lock(1819242352, -2)";
 constexpr const char* kLockSession = "SELECT pg_advisory_lock(1819242352, $1::bigint::integer)";
+constexpr const char* kTrySession = "SELECT pg_try_advisory_lock(1819242352, $1::bigint::integer)";
 constexpr const char* kCountLocked =
     "SELECT count(*) FROM pg_locks WHERE locktype = 'advisory' AND objsubid = 2 AND classid = "
     "1819242352 AND objid::bigint BETWEEN 1 AND $1 AND database = (SELECT oid FROM pg_database "
@@ -33,6 +34,10 @@ constexpr const char* kEndHolders =
     "SELECT pg_terminate_backend(pid) FROM pg_locks WHERE locktype = 'advisory' AND objsubid = 2 "
     "AND classid = 1819242352 AND objid::bigint = $1 AND pid <> pg_backend_pid() AND database = "
     "(SELECT oid FROM pg_database WHERE datname = current_database())";
+/// Sessions that were moved here keep their numbers.
+constexpr const char* kNumbers =
+    "SELECT number FROM (SELECT nextval('session_number') AS number FROM generate_series(1, "
+    "$1::bigint)) AS drawn WHERE number NOT IN (SELECT session FROM session)";
 constexpr std::int64_t kMaxSession = 2'147'483'647;
 
 }  // namespace
@@ -104,13 +109,13 @@ std::unique_ptr<MapDatabase::Transaction> FleetDatabase::snapshot() const {
 }
 
 std::vector<int> FleetDatabase::new_sessions(std::size_t number) const {
-  const Result rows =
-      connection_.run("SELECT nextval('session_number') FROM generate_series(1, $1::bigint)",
-                      {parameter(static_cast<std::int64_t>(number))});
   std::vector<int> sessions;
-  sessions.reserve(number);
-  for (int row = 0; row < PQntuples(rows.get()); ++row) {
-    sessions.push_back(static_cast<int>(integer_in(*rows, row, 0)));
+  while (sessions.size() < number) {
+    const Result rows =
+        connection_.run(kNumbers, {parameter(static_cast<std::int64_t>(number - sessions.size()))});
+    for (int row = 0; row < PQntuples(rows.get()); ++row) {
+      sessions.push_back(static_cast<int>(integer_in(*rows, row, 0)));
+    }
   }
   return sessions;
 }
@@ -124,6 +129,10 @@ MapDatabase::NewSession FleetDatabase::begin_session() const {
   numbering.end();
   session_ = session;
   return {.session = session, .is_linked = is_linked};
+}
+
+bool FleetDatabase::hold_session(int session) const {
+  return connection_.integer(kTrySession, {parameter(session)}) != 0;
 }
 
 std::int64_t FleetDatabase::place_key(const SessionFrame& at, std::int64_t /*previous*/) const {

@@ -30,6 +30,7 @@ class FleetDatabase final : public MapDatabase {
   void prepare_long_transaction() const override {}
   [[nodiscard]] std::vector<int> new_sessions(std::size_t number) const override;
   [[nodiscard]] NewSession begin_session() const override;
+  [[nodiscard]] bool hold_session(int session) const override;
   [[nodiscard]] std::int64_t place_key(const SessionFrame& at,
                                        std::int64_t previous) const override;
   [[nodiscard]] bool is_being_written() const override;

@@ -92,6 +92,7 @@ CREATE TABLE relative_pose (
   pose bytea NOT NULL CHECK (octet_length(pose) = 264),
   checksum bigint NOT NULL);
 CREATE TABLE linked (session bigint PRIMARY KEY REFERENCES session, checksum bigint NOT NULL);
+CREATE TABLE moved (uid text PRIMARY KEY, session bigint NOT NULL);
 -- Neither can be compressed any more.
 ALTER TABLE features ALTER COLUMN features SET STORAGE EXTERNAL;
 ALTER TABLE image ALTER COLUMN image SET STORAGE EXTERNAL;
@@ -103,7 +104,8 @@ CREATE INDEX ON rejected (batch);
 CREATE INDEX ON rejected (session, frame))";
 
 /// The lock makes epochs follow each other as commits do. Sessions that began after one that grows
-/// were not compared with all of it.
+/// were not compared with all of it. What a robot still has of a session that was moved is refused:
+/// it would be a second one.
 constexpr const char* kFunctions = R"(
 CREATE FUNCTION end_batch() RETURNS bigint LANGUAGE plpgsql SECURITY DEFINER
 SET search_path = loopbit, pg_temp AS $$
@@ -124,7 +126,20 @@ REVOKE ALL ON FUNCTION end_batch() FROM PUBLIC;
 CREATE FUNCTION is_own(number bigint) RETURNS boolean LANGUAGE sql STABLE
 SET search_path = loopbit, pg_temp AS $$
   SELECT EXISTS (SELECT FROM session WHERE session.session = number AND owner = current_user)
-$$)";
+$$;
+CREATE FUNCTION refuse_moved() RETURNS trigger LANGUAGE plpgsql
+SET search_path = loopbit, pg_temp AS $$
+DECLARE
+  number bigint;
+BEGIN
+  SELECT moved.session INTO number FROM moved WHERE uid = NEW.uid;
+  IF FOUND THEN
+    RAISE 'session % was moved to another server; add its frames to the map there', number;
+  END IF;
+  RETURN NEW;
+END
+$$;
+CREATE TRIGGER refuse_moved BEFORE INSERT ON session FOR EACH ROW EXECUTE FUNCTION refuse_moved())";
 
 /// A writer adds sessions, and changes only those that it added.
 constexpr const char* kRights = R"(

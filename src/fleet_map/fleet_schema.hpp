@@ -7,7 +7,7 @@
 namespace loopbit {
 
 /// The version of the tables on a server. All are those of map files of version 4.
-inline constexpr int kFleetVersion = 2;
+inline constexpr int kFleetVersion = 3;
 
 /// Makes the tables and roles in the current transaction. `first_session`: its number.
 void create_tables(const Connection& connection, int first_session);

@@ -70,6 +70,8 @@ std::vector<int> FileDatabase::new_sessions(std::size_t number) const {
   return sessions;
 }
 
+bool FileDatabase::hold_session(int /*session*/) const { return true; }  // a file has one writer
+
 std::int64_t FileDatabase::place_key(const SessionFrame& /*at*/, std::int64_t previous) const {
   return previous > 0 ? previous + 1 : next_key(file_, "place");
 }

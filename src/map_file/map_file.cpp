@@ -95,7 +95,8 @@ struct MapReader::Impl {
   Damage damage;
   std::vector<MapSession> sessions;
   std::optional<SearchedPlaces> searched;
-  std::int64_t epoch = 0;  ///< see set_epoch(); 0 = the present one
+  std::int64_t epoch = 0;                              ///< see set_epoch(); 0 = the present one
+  std::unique_ptr<MapDatabase::Transaction> snapshot;  ///< see begin_snapshot()
 };
 
 MapReader::MapReader(const std::string& path, std::size_t cache_mb)
@@ -181,6 +182,12 @@ PlaceSearch* MapReader::place_search() {
 
 void MapReader::set_time_limit(std::chrono::milliseconds limit) {
   impl_->database->set_time_limit(limit);
+}
+
+void MapReader::begin_snapshot() {
+  impl_->snapshot.reset();
+  impl_->snapshot = impl_->database->snapshot();
+  impl_->sessions = read_sessions(*impl_->database, impl_->damage);
 }
 
 void MapReader::set_epoch(std::int64_t epoch) {

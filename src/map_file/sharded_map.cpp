@@ -24,6 +24,7 @@ struct ShardedMap::Found {
   Origin origin;
   SessionFrame at;
   Known known;
+  bool is_copy = false;  ///< it counts at another shard
 };
 
 ShardedMap::ShardedMap(const std::vector<std::string>& addresses, std::size_t cache_mb) {
@@ -41,25 +42,57 @@ ShardedMap::ShardedMap(const std::vector<std::string>& addresses, std::size_t ca
     }
   }
   if (notices_.size() == shards_.size()) throw Error(*first);
-  check_sessions();
+  take_snapshots();
+  find_owners();
 }
 
 ShardedMap::~ShardedMap() = default;
 
-void ShardedMap::check_sessions() const {
-  std::map<int, std::string> owners;
+/// The first may lack a session that reaches one shard after its snapshot and leaves another one
+/// before. Then that one had it when the sessions were read the last time.
+void ShardedMap::take_snapshots() {
+  std::set<int> before;
+  std::set<int> now = sessions();
+  do {
+    before = std::move(now);
+    for (Shard& shard : shards_) ask(shard, [&] { shard.reader->begin_snapshot(); });
+    now = sessions();
+  } while (!std::ranges::includes(now, before));
+}
+
+std::set<int> ShardedMap::sessions() const {
+  std::set<int> numbers;
   for (const Shard& shard : shards_) {
     if (!shard.reader) continue;
-    for (const MapSession& session : shard.reader->sessions()) {
-      const auto [owner, is_new] = owners.emplace(session.session, shard.shown);
-      if (is_new) continue;
-      throw Error(
-          ErrorKind::option,
-          fmt::format("Session {} is in '{}' and in '{}': give each map once, and number "
-                      "their sessions differently, by 'loopbit map create --first-session'.",
-                      session.session, owner->second, shard.shown));
+    for (const MapSession& session : shard.reader->sessions()) numbers.insert(session.session);
+  }
+  return numbers;
+}
+
+void ShardedMap::find_owners() {
+  std::map<int, const MapSession*> found;
+  for (std::uint32_t number = 0; number < shards_.size(); ++number) {
+    if (!shards_[number].reader) continue;
+    for (const MapSession& session : shards_[number].reader->sessions()) {
+      const auto [earlier, is_new] = found.emplace(session.session, &session);
+      if (!is_new && earlier->second->uid != session.uid) {
+        throw Error(
+            ErrorKind::option,
+            fmt::format("Session {} in '{}' is another one than in '{}': number the sessions of "
+                        "maps differently, by 'loopbit map create --first-session'.",
+                        session.session, shards_[owners_.at(session.session)].shown,
+                        shards_[number].shown));
+      }
+      if (!is_new && earlier->second->frames >= session.frames) continue;
+      earlier->second = &session;
+      owners_[session.session] = number;
     }
   }
+}
+
+bool ShardedMap::is_copy(std::uint32_t shard, int session) const {
+  const auto owner = owners_.find(session);
+  return owner != owners_.end() && owner->second != shard;
 }
 
 LoopDetectorOptions ShardedMap::options() const {
@@ -122,18 +155,18 @@ std::vector<ShardedMap::Found<Known>> ShardedMap::gather(const Read& read) {
     PlaceId next = 0;
     const bool is_whole = ask(shard, [&] {
       read(*shard.reader, [&](const SessionFrame& at, Known known) {
-        all.push_back({{number, next++}, at, std::move(known)});
+        all.push_back({{number, next++}, at, std::move(known), is_copy(number, at.session)});
       });
     });
     if (!is_whole) all.resize(before);
+    shard.places.assign(all.size() - before, kCopy);
   }
   std::ranges::stable_sort(all, {}, [](const Found<Known>& found) {
     return std::pair(found.at.session, found.at.frame);
   });
   for (const Found<Known>& found : all) {
-    Shard& owner = shards_[found.origin.shard];
-    owner.places.resize(owner.places.size() + 1);
-    owner.places[static_cast<std::size_t>(found.origin.place)] =
+    if (found.is_copy) continue;
+    shards_[found.origin.shard].places[static_cast<std::size_t>(found.origin.place)] =
         static_cast<PlaceId>(places_.size());
     places_.push_back(found.origin);
   }
@@ -155,7 +188,9 @@ PlaceSearch* ShardedMap::place_search() {
 void ShardedMap::for_each_earlier_place(const MapStorage::Visit& visit) {
   const auto found = gather<BinaryContent>(
       [](MapReader& reader, const auto& add) { reader.for_each_earlier_place(add); });
-  for (const auto& [origin, at, content] : found) visit(at, content);
+  for (const auto& [origin, at, content, is_copy] : found) {
+    if (!is_copy) visit(at, content);
+  }
 }
 
 /// A shard compares the first places of a session with those of another session than one map
@@ -166,7 +201,7 @@ void ShardedMap::for_each_place(double unmoved, const PlaceSearch::Visit& visit)
   });
   const Origin* last = nullptr;
   std::vector<const Origin*> last_of_shards(shards_.size());
-  for (const auto& [origin, at, is_step_of_shard] : found) {
+  for (const auto& [origin, at, is_step_of_shard, is_copy] : found) {
     const Origin*& last_of_shard = last_of_shards[origin.shard];
     bool is_step = is_step_of_shard;
     if (last && last != last_of_shard) {
@@ -174,6 +209,7 @@ void ShardedMap::for_each_place(double unmoved, const PlaceSearch::Visit& visit)
       is_step = count(seen) > 0 && similarity(seen, content(*last)) < unmoved;
     }
     if (is_step_of_shard) last_of_shard = &origin;
+    if (is_copy) continue;
     if (is_step) last = &origin;
     visit(at, is_step);
   }
@@ -181,11 +217,12 @@ void ShardedMap::for_each_place(double unmoved, const PlaceSearch::Visit& visit)
 
 void ShardedMap::for_each_earlier_loop(const VisitLoop& visit) {
   std::vector<std::pair<SessionFrame, SessionFrame>> loops;
-  for (Shard& shard : shards_) {
+  for (std::uint32_t number = 0; number < shards_.size(); ++number) {
+    Shard& shard = shards_[number];
     ask(shard, [&] {
       shard.reader->for_each_earlier_loop(
           [&](const SessionFrame& query, const SessionFrame& match) {
-            loops.emplace_back(query, match);
+            if (!is_copy(number, query.session)) loops.emplace_back(query, match);
           });
     });
   }
@@ -211,7 +248,8 @@ ShardedMap::Similar ShardedMap::most_similar(const BinaryContent& content,
       const Similar similar = answers[i].get();
       all.is_all = all.is_all && similar.is_all;
       for (const auto& [place, value] : similar.places) {
-        all.places.push_back({shard.places.at(static_cast<std::size_t>(place)), value});
+        const PlaceId ours = shard.places.at(static_cast<std::size_t>(place));
+        if (ours != kCopy) all.places.push_back({ours, value});
       }
     });
   }

@@ -76,6 +76,10 @@ class MapDatabase {
   /// a snapshot that is taken later is all that the session's frames are compared with.
   [[nodiscard]] virtual NewSession begin_session() const = 0;
 
+  /// Makes an earlier session count as being written until this database is gone. False if another
+  /// program writes it.
+  [[nodiscard]] virtual bool hold_session(int session) const = 0;
+
   /// The numbers of new sessions, ascending, which are written in one transaction.
   [[nodiscard]] virtual std::vector<int> new_sessions(std::size_t number) const = 0;
 

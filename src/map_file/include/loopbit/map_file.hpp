@@ -153,6 +153,9 @@ class MapReader : public MapStorage {
   /// A server that answers later than this is an Error (kind input); 0 = it may take any time.
   void set_time_limit(std::chrono::milliseconds limit);
 
+  /// Reads the sessions again. Until the next call, all that is read was committed before.
+  void begin_snapshot();
+
   /// From now on, a LoopDetector of this map sees what was committed up to this epoch, without what
   /// was removed or rejected since then. Throws Error (kind option) if the map is not on a server
   /// or has not come so far.

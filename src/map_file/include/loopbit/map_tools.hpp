@@ -38,6 +38,21 @@ struct MergeCounts {
 /// different settings; input if `from` is damaged or being written.
 MergeCounts merge_map(const std::string& into, const std::string& from);
 
+struct MoveCounts {
+  std::int64_t sessions = 0;  ///< moved
+  std::int64_t places = 0;    ///< of them
+  std::int64_t known = 0;     ///< sessions that `from` does not have, but `to` has
+};
+
+/// Moves sessions with their loops from one server to another, under their numbers. Each is copied
+/// in one commit, read again and compared, and only then removed, in one commit. So a second call
+/// continues after a kill; meanwhile, ShardedMap takes two copies for one. Needs the owners of both
+/// maps. Throws Error: kind option if a map is a file, has no such session, or has another one of
+/// its number; output if a session is being written, changes meanwhile, or a server does not take
+/// part; input if a map is damaged.
+MoveCounts move_sessions(const std::string& from, const std::string& to,
+                         const std::vector<int>& sessions);
+
 /// The progress of link_map(), and its result.
 struct LinkCounts {
   std::int64_t sessions = 0;      ///< compared with all earlier ones

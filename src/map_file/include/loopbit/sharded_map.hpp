@@ -4,7 +4,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -16,11 +18,12 @@ namespace loopbit {
 /// Reads a map whose sessions are distributed over several servers: the answers are those of one
 /// map with all sessions. The servers need not know each other. If all can search, contents are
 /// sent to all at once, and features are read from the owners of the candidates. A server that does
-/// not answer is left out from then on. Serves the queries of one LoopDetector.
+/// not answer is left out from then on. Of a session that two servers have, since it is being
+/// moved, one copy counts. Sees no later change. Serves the queries of one LoopDetector.
 class ShardedMap final : public MapStorage, private PlaceSearch {
  public:
   /// Throws Error: the first one if no server can be asked, and kind option if two servers have
-  /// sessions of the same number.
+  /// different sessions of the same number.
   explicit ShardedMap(const std::vector<std::string>& addresses,
                       std::size_t cache_mb = kMapCache_mb);
   ~ShardedMap() override;
@@ -56,7 +59,8 @@ class ShardedMap final : public MapStorage, private PlaceSearch {
   struct Shard {
     std::string shown;                  ///< its address
     std::unique_ptr<MapReader> reader;  ///< null if it is left out
-    std::vector<PlaceId> places = {};   ///< the numbers of its places, by its own
+    std::vector<PlaceId> places = {};   ///< the numbers of its places, by its own;
+                                        ///< kCopy: another shard's copy counts
   };
 
   /// Where a place is.
@@ -68,12 +72,19 @@ class ShardedMap final : public MapStorage, private PlaceSearch {
   template <typename Known>
   struct Found;
 
+  static constexpr PlaceId kCopy = -1;
+
   void for_each_place(double unmoved, const PlaceSearch::Visit& visit) override;
   Similar most_similar(const BinaryContent& content, int shift_tolerance_columns,
                        std::size_t number) override;
   BinaryContent content(PlaceId place) override;
 
-  void check_sessions() const;
+  /// Begins a snapshot of each shard. Together, they have all sessions that move meanwhile.
+  void take_snapshots();
+  [[nodiscard]] std::set<int> sessions() const;
+  void find_owners();
+  /// Whether another shard's copy of the session counts.
+  [[nodiscard]] bool is_copy(std::uint32_t shard, int session) const;
   [[noreturn]] void refuse_change() const;
   [[nodiscard]] BinaryContent content(const Origin& origin);
   /// Leaves a shard out for which `work` fails, and returns whether it did not.
@@ -84,6 +95,7 @@ class ShardedMap final : public MapStorage, private PlaceSearch {
   std::vector<Found<Known>> gather(const Read& read);
 
   std::vector<Shard> shards_;
+  std::map<int, std::uint32_t> owners_;  ///< by session; without those that no description names
   std::vector<Origin> places_;
   std::vector<std::string> notices_;
 };
