@@ -48,6 +48,15 @@ void bind_results(py::module_& module) {
         return fmt::format("MergeCounts(sessions={}, places={}, loops={}, known={})", self.sessions,
                            self.places, self.loops, self.known);
       });
+  py::class_<MoveCounts>(module, "MoveCounts", "The result of move_sessions().")
+      .def_readonly("sessions", &MoveCounts::sessions)
+      .def_readonly("places", &MoveCounts::places)
+      .def_readonly("known", &MoveCounts::known,
+                    "Sessions that had been moved before: only the second map has them.")
+      .def("__repr__", [](const MoveCounts& self) {
+        return fmt::format("MoveCounts(sessions={}, places={}, known={})", self.sessions,
+                           self.places, self.known);
+      });
   py::class_<LinkCounts>(module, "LinkCounts", "The result of link_map().")
       .def_readonly("sessions", &LinkCounts::sessions, "Sessions compared with all earlier ones.")
       .def_readonly("places", &LinkCounts::places,
@@ -150,6 +159,15 @@ void bind_map_tools(py::module_& module) {
       py::arg("into"), py::arg("other"), Free(),
       "Copies the sessions of another map that this one lacks, with their places and loops. Copies "
       "everything or nothing. Creates the map if there is none.");
+  module.def(
+      "move_sessions",
+      [](const Path& source, const Path& to, const std::vector<int>& sessions) {
+        return move_sessions(source.string(), to.string(), sessions);
+      },
+      py::arg("source"), py::arg("to"), py::arg("sessions"), Free(),
+      "Moves sessions from one server to another, under their numbers. Each is copied, read again "
+      "and compared before it is removed, so that a second call continues after a crash. Needs the "
+      "owners of both maps.");
   module.def(
       "link_map",
       [](const Path& path, const std::optional<LoopDetectorOptions>& options) {

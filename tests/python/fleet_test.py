@@ -86,6 +86,22 @@ def test_a_run_uses_a_map_on_a_server(maps, dataset, server, command, tmp_path):
     assert [session.frames for session in loopbit.MapReader(address).sessions] == [2 * LAP]
 
 
+def test_sessions_move_to_another_server(maps, server, command):
+    _, file, _ = maps
+    ends = []
+    for name in ("here", "there"):
+        server.sql("postgres", f"CREATE DATABASE {name}")
+        ends.append(server.address(name))
+        command("map", "create", ends[-1])
+    loopbit.merge_map(ends[0], file)
+    moved = loopbit.move_sessions(*ends, [2])
+    assert (moved.sessions, moved.places, moved.known) == (1, LAP, 0)
+    assert [[session.session for session in loopbit.MapReader(end).sessions] for end in ends] == [[1], [2]]
+    assert loopbit.move_sessions(*ends, [2]).known == 1
+    with pytest.raises(loopbit.OptionError, match="no session 9"):
+        loopbit.move_sessions(*ends, [9])
+
+
 def test_a_password_is_not_shown(maps):
     reader = loopbit.MapReader(maps[0])
     for text in (reader.path, repr(reader)):
