@@ -5,9 +5,10 @@
 /// __real_main().
 ///
 /// A request on stdin: the number of strings, then so many strings, each with a zero byte at its
-/// end: working directory, files for stdout and stderr, the number of variables, variables as
-/// NAME=VALUE, and the arguments, beginning with the name of the program. The answer on stdout: a
-/// line with the exit code, or the negative number of the signal that ended it.
+/// end: "run" or "start", working directory, files for stdout and stderr, the number of variables,
+/// variables as NAME=VALUE, and the arguments, beginning with the name of the program. The answer
+/// on stdout is a line: after "run" the exit code, or the negative number of the signal that ended
+/// it; after "start" the number of the process, which whoever adopts orphans of this one waits for.
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
@@ -51,13 +52,13 @@ void redirect(int stream, const char* file, int flags) {
 constexpr unsigned kTimeLimit_s = 600;  ///< as in served_command.py
 
 [[noreturn]] void run(std::vector<std::string> request) {
-  if (chdir(request[0].c_str()) != 0) std::abort();
+  if (chdir(request[1].c_str()) != 0) std::abort();
   redirect(STDIN_FILENO, "/dev/null", O_RDONLY);
-  redirect(STDOUT_FILENO, request[1].c_str(), O_WRONLY);
-  redirect(STDERR_FILENO, request[2].c_str(), O_WRONLY);
+  redirect(STDOUT_FILENO, request[2].c_str(), O_WRONLY);
+  redirect(STDERR_FILENO, request[3].c_str(), O_WRONLY);
   alarm(kTimeLimit_s);
-  const std::size_t arguments = 4 + std::stoul(request[3]);
-  for (std::size_t i = 4; i < arguments; ++i) putenv(request[i].data());
+  const std::size_t arguments = 5 + std::stoul(request[4]);
+  for (std::size_t i = 5; i < arguments; ++i) putenv(request[i].data());
   std::vector<char*> argv;
   for (std::size_t i = arguments; i < request.size(); ++i) argv.push_back(request[i].data());
   const int count = static_cast<int>(argv.size());
@@ -67,15 +68,26 @@ constexpr unsigned kTimeLimit_s = 600;  ///< as in served_command.py
   _exit(code);  // 246 libraries have much to tidy up
 }
 
+/// Leaves the process that runs the request an orphan.
+[[noreturn]] void start(std::vector<std::string> request) {
+  const pid_t child = fork();
+  if (child == 0) run(std::move(request));
+  std::printf("%d", child);  // the end of the line comes when this process is gone
+  std::fflush(stdout);
+  _exit(child < 0 ? 1 : 0);
+}
+
 }  // namespace
 
 int __wrap_main(int /*argc*/, char** /*argv*/) {
   while (std::optional<std::vector<std::string>> request = next_request()) {
+    const bool is_start = request->front() == "start";
     const pid_t child = fork();
-    if (child == 0) run(std::move(*request));
+    if (child == 0) (is_start ? start : run)(std::move(*request));
     int status = 0;
     if (child < 0 || waitpid(child, &status, 0) != child) return 1;
-    std::printf("%d\n", WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status));
+    if (!is_start) std::printf("%d", WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status));
+    std::printf("\n");
     std::fflush(stdout);
   }
   return 0;

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Runs commands within limits, and writes down what no command may do."""
 
+import functools
 import hashlib
 import os
 import pathlib
@@ -12,13 +13,16 @@ import signal
 import subprocess
 import sys
 import time
+import types
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))
 from loopbit_command import LOOPBIT, decisions, rows  # noqa: E402, takes the command's path
+from served_command import Server  # noqa: E402
 
 DOCUMENTED_CODES = (0, 2, 3, 4, 130)
 MAX_SECONDS = 60  # of the clock: a hang
 MAX_CPU_SECONDS = 20
+CPU_LIMIT = (resource.RLIMIT_CPU, 2 * MAX_CPU_SECONDS)
 MAX_MEMORY_MIB = 1024
 MAX_SENTENCE = 10_000  # characters: a path may have 4096
 SENTENCE = re.compile(r"loopbit: \S.*\.")
@@ -63,6 +67,13 @@ def running(process):
     return os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
 
 
+@functools.cache
+def server(_process):
+    """Starts the command for a process, which shares it with no other; none if there is no build of it."""
+    program = os.environ.get("COMMAND_SERVER")
+    return Server(program) if program else None
+
+
 class Try:
     """One try of an attack: a scratch folder, random numbers of its own, and the faults seen."""
 
@@ -88,7 +99,7 @@ class Try:
     def start(self, *arguments, program=None, limits=(), environment=None, cores=None):
         """Begins a command that finish() waits for."""
         def limit():
-            for what, value in [(resource.RLIMIT_CPU, 2 * MAX_CPU_SECONDS), *limits]:
+            for what, value in [CPU_LIMIT, *limits]:
                 resource.setrlimit(what, (value, value))
             if cores:
                 os.sched_setaffinity(0, cores)
@@ -97,9 +108,14 @@ class Try:
         command = [os.fsencode(a if isinstance(a, os.PathLike) else str(a)) for a in command]
         number = len(list(self.folder.glob("stdout*")))
         streams = [open(self.folder / f"{name}{number}", "w+b") for name in ("stdout", "stderr")]
-        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=streams[0],
-                                   stderr=streams[1], preexec_fn=limit,
-                                   env={**os.environ, **(environment or {})})
+        if server(os.getpid()) and not (program or limits or cores):
+            pid = server(os.getpid()).start(command, *streams, environment or {})
+            resource.prlimit(pid, CPU_LIMIT[0], (CPU_LIMIT[1], CPU_LIMIT[1]))
+            process = types.SimpleNamespace(pid=pid, args=command)
+        else:
+            process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=streams[0],
+                                       stderr=streams[1], preexec_fn=limit,
+                                       env={**os.environ, **(environment or {})})
         process.streams, process.begun = streams, time.monotonic()
         return process
 

@@ -6,12 +6,12 @@ import pathlib
 import shutil
 import sqlite3
 import struct
-import subprocess
 import sys
 import time
 import zlib
 
 from harness import LOOPBIT, decisions
+from served_command import run_command
 
 FRAMES = 24
 WIDTH, HEIGHT = 320, 240
@@ -39,8 +39,7 @@ class Material:
         self.formats = folder / "formats"
 
     def command(self, *arguments):
-        subprocess.run([LOOPBIT, *map(str, arguments)], check=True,
-                       stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+        run_command(LOOPBIT, *arguments).check_returncode()
 
     def make(self):
         self.command("demo", "--write-images", self.town, "--frames", FRAMES, "--world", "laps=2",
