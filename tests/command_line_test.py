@@ -26,7 +26,7 @@ import unittest
 import zlib
 
 from loopbit_command import (FRAMES, LOOPBIT, QUICK, WORLD, CommandTest, complaints, decisions,
-                             loopbit, rows)
+                             loopbit, repeats_when_sanitized, rows)
 
 HEADER = (
     "frame,timestamp,status,match,score,similarity,matches,inliers,"
@@ -68,6 +68,7 @@ class CommandLineTest(CommandTest):
         camera.write_text(re.sub("image_width: 320", f"image_width: {width_px}", text))
         return camera
 
+    @repeats_when_sanitized
     def test_a_camera_gives_each_loop_a_row(self):
         camera = self.dataset / "camera.yaml"
         ran = loopbit("run", self.images, "--out", self.out, "--camera", camera, "--no-report")
@@ -151,6 +152,7 @@ class CommandLineTest(CommandTest):
                          bytes(len(bright)) * (width * dark_rows))
         return file
 
+    @repeats_when_sanitized
     def test_a_mask_leaves_out_a_part_of_all_images(self):
         run = ["run", self.images, "--out", self.out, "--no-report", "--overwrite"]
         self.assertEqual(loopbit(*run, "--mask", self.mask()).returncode, 0)
@@ -168,6 +170,7 @@ class CommandLineTest(CommandTest):
             self.assert_fails(ran, 2 if parts == ("0 everywhere",) else 3, *parts)
         self.assertFalse(self.out.exists())
 
+    @repeats_when_sanitized
     def test_a_query_takes_the_mask_of_its_map(self):
         town = self.scratch / "town.db"
         mask = self.mask(dark_rows=80)
@@ -193,6 +196,7 @@ class CommandLineTest(CommandTest):
                 self.assert_fails(ran, 3, camera)
         self.assertFalse(self.out.exists())
 
+    @repeats_when_sanitized
     def test_a_calibration_in_the_folder_is_found(self):
         images = self.few_images(3)
         run = ["run", images, "--out", self.out, "--no-report", "--overwrite"]
@@ -316,6 +320,7 @@ class CommandLineTest(CommandTest):
         without_time = [{**row, "timestamp": ""} for row in decisions(self.out)]
         self.assertEqual(without_time, decisions(self.reference))
 
+    @repeats_when_sanitized
     def test_every_and_limit(self):
         ran = loopbit("run", self.images, "--out", self.out, "--every", 3, "--limit", 5)
         self.assertEqual(ran.returncode, 0, ran.stderr)
@@ -331,6 +336,7 @@ class CommandLineTest(CommandTest):
         self.assertEqual(sorted(path.name for path in self.scratch.glob("few_*")),
                          ["few_loops", "few_loops_2", "few_loops_3"])
 
+    @repeats_when_sanitized
     def test_json_is_one_line_per_loop_and_a_summary(self):
         ran = loopbit("run", self.images, "--out", self.out, "--no-report", "--json")
         self.assertEqual((ran.returncode, complaints(ran)), (0, []))
@@ -395,6 +401,7 @@ class CommandLineTest(CommandTest):
         self.assertEqual(options["decision"]["min_score"], 1000.0)
         self.assertEqual(options["surf"]["max_keypoints"], 200)
 
+    @repeats_when_sanitized
     def test_printed_settings_are_a_settings_file(self):
         config = self.scratch / "settings.json"
         config.write_text(loopbit("options", "--json").stdout)
@@ -576,6 +583,7 @@ class CommandLineTest(CommandTest):
                     self.assertIn(f"'{video}' is cut off after {size} of", told)
                 self.assertEqual("cut off" in ran.stdout, name == "cut")
 
+    @repeats_when_sanitized
     def test_only_regular_files_are_waited_for(self):
         for name in ("v.avi", "v.png", "list.txt"):
             pipe = self.scratch / name
@@ -615,6 +623,7 @@ class CommandLineTest(CommandTest):
         text.write_text("Dear loopbit,")
         self.assert_fails(loopbit("run", text, "--out", self.out), 3, text)
 
+    @repeats_when_sanitized
     def test_an_earlier_run_is_never_overwritten_unasked(self):
         folder = self.few_images()
         self.assertEqual(loopbit("run", folder, "--out", self.out).returncode, 0)
@@ -624,6 +633,7 @@ class CommandLineTest(CommandTest):
         again = loopbit("run", folder, "--out", self.out, "--overwrite")
         self.assertEqual(again.returncode, 0, again.stderr)
 
+    @repeats_when_sanitized
     def test_a_bad_setting_leaves_an_earlier_run_alone(self):
         folder = self.few_images()
         self.assertEqual(loopbit("run", folder, "--out", self.out).returncode, 0)
@@ -632,6 +642,7 @@ class CommandLineTest(CommandTest):
         self.assert_fails(bad, 2, "surf.x")
         self.assertEqual((self.out / "loops.csv").read_bytes(), before)
 
+    @repeats_when_sanitized
     def test_an_unknown_kernel_leaves_an_earlier_run_alone(self):
         folder = self.few_images(2)
         self.assertEqual(loopbit("run", folder, "--out", self.out).returncode, 0)
@@ -641,6 +652,7 @@ class CommandLineTest(CommandTest):
         self.assert_fails(bad, 2, "LOOPBIT_KERNEL")
         self.assertEqual((self.out / "loops.csv").read_bytes(), before)
 
+    @repeats_when_sanitized
     def test_a_data_set_is_no_earlier_run(self):
         folder = self.scratch / "town"
         folder.mkdir()
@@ -665,6 +677,7 @@ class CommandLineTest(CommandTest):
         self.assertTrue((self.out / "loops.csv").exists())
         self.assertEqual(loopbit(*run, truth, "--overwrite").returncode, 0)
 
+    @repeats_when_sanitized
     def test_an_input_without_an_image_leaves_an_earlier_run_alone(self):
         self.assertEqual(loopbit("run", self.few_images(3), "--out", self.out).returncode, 0)
         before = (self.out / "loops.csv").read_bytes()
@@ -680,6 +693,7 @@ class CommandLineTest(CommandTest):
         self.assertEqual([row["status"] for row in rows(self.out)],
                          ["unreadable", "no_earlier_place"])
 
+    @repeats_when_sanitized
     def test_images_too_small_to_use_leave_an_earlier_run_alone(self):
         self.assertEqual(loopbit("run", self.few_images(3), "--out", self.out).returncode, 0)
         before = (self.out / "loops.csv").read_bytes()
@@ -690,6 +704,7 @@ class CommandLineTest(CommandTest):
         self.assert_fails(ran, 3, tiny, "1.pgm", "20 x 20")
         self.assertEqual((self.out / "loops.csv").read_bytes(), before)
 
+    @repeats_when_sanitized
     def test_a_window_of_seconds_without_times_writes_nothing(self):
         few = self.few_images(3)
         seconds = ("--set", "exclusion.seconds=5")
@@ -701,6 +716,7 @@ class CommandLineTest(CommandTest):
         self.assert_fails(ran, 2, "exclusion.seconds", "000000.png")
         self.assertEqual((self.out / "loops.csv").read_bytes(), before)
 
+    @repeats_when_sanitized
     def test_a_stderr_that_cannot_be_written_ends_nothing(self):
         run = [LOOPBIT, "run", self.unreadable_images(20), "--no-report", "--out"]
         missing = [LOOPBIT, "run", self.scratch / "none", "--out", self.out]
@@ -785,6 +801,7 @@ class CommandLineTest(CommandTest):
 
         return loopbit("run", images, "--out", self.out, *flags, preexec_fn=limit_file_size)
 
+    @repeats_when_sanitized
     def test_full_disk_keeps_whole_rows(self):
         # So many that their rows take more than what run.json begins with, and so small that they take
         # no time.
@@ -801,12 +818,14 @@ class CommandLineTest(CommandTest):
         self.assertTrue(all(row["verification_ms"] for row in kept))
         self.assertIn(f"The {len(kept)} rows", ran.stderr)
 
+    @repeats_when_sanitized
     def test_a_disk_too_full_for_pictures_keeps_the_rows(self):
         ran = self.run_on_small_disk(self.few_images(), 100_000)
         self.assert_fails(ran, 4, "evidence.db", "free space", "--no-report")
         self.assertGreater(len(rows(self.out)), 0)
         self.assertIn("evidence.db", json.loads((self.out / "run.json").read_text())["stopped_by"])
 
+    @repeats_when_sanitized
     def test_a_full_disk_costs_no_earlier_run(self):
         few = self.few_images(3)
         self.assertEqual(loopbit("run", few, "--out", self.out, "--no-report").returncode, 0)
@@ -850,6 +869,7 @@ class CommandLineTest(CommandTest):
                 ran = loopbit("run", self.images, "--out", self.out, "--set", setting)
                 self.assert_fails(ran, 2, words)
 
+    @repeats_when_sanitized
     def test_bad_settings_files(self):
         for text, words in [("{", "not valid JSON"), ("[]", "object"),
                             ('{"surf": {"upright": 3}}', "surf.upright is '3'"),

@@ -27,7 +27,8 @@ if sys.argv[2:3] == ["--search"]:
     del sys.argv[2:4]
 sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent / "scripts"))
 
-from loopbit_command import FRAMES, QUICK, CommandTest, decisions, loopbit, started    # noqa: E402
+from loopbit_command import (FRAMES, QUICK, CommandTest, decisions, loopbit, repeats_when_sanitized,    # noqa: E402
+                             started)
 from postgres_server import ENCODED_PASSWORD, PASSWORD, PostgresServer    # noqa: E402
 from served_command import TIME_LIMIT_S    # noqa: E402
 
@@ -115,6 +116,7 @@ class FleetTest(CommandTest):
         self.assertEqual(record["map"], {"path": shown, "session": 2})
         self.assertIn(shown, record["arguments"])
 
+    @repeats_when_sanitized
     def test_queries_and_exports_answer_as_of_a_file(self):
         viewer = self.server.address("town", "viewer")
         shown = self.server.address("town", "viewer", None)
@@ -263,6 +265,7 @@ class FleetTest(CommandTest):
         self.assertEqual(list(out.glob("queue*")), [])
         self.assert_all_is_saved(address.rsplit("/", 1)[1], out)
 
+    @repeats_when_sanitized
     def test_a_server_that_stays_away_is_brought_up_to_date_later(self):
         address = self.new_town("away")
         out = self.scratch / "second"
@@ -345,6 +348,7 @@ class FleetTest(CommandTest):
         self.assertNotEqual(self.lines(*query, 1), answer)
         self.assert_fails(loopbit(*query, 10000), 2, "10000")
 
+    @repeats_when_sanitized
     def test_a_full_server_is_brought_up_to_date_later(self):
         address = self.new_town("filled")
         out = self.scratch / "second"
@@ -587,6 +591,7 @@ class FleetTest(CommandTest):
         return subprocess.run(["psql", "-X", "-q", "-A", "-t", "-c", statement,
                                self.server.address("town", "robot2")], capture_output=True, text=True)
 
+    @repeats_when_sanitized
     def test_a_robot_changes_only_its_own_sessions(self):
         before = self.lines("map", "export", self.town, "--format", "json")
         for statement in ("UPDATE loopbit.session SET frames = 0",
