@@ -20,6 +20,8 @@ namespace loopbit {
 namespace {
 
 constexpr int kBinary = 1;
+/// 3 MB of features.
+constexpr int kMaxPosted = 128;
 
 /// Network byte order, which is big-endian.
 std::string big_endian(std::uint64_t value) {
@@ -138,6 +140,7 @@ Connection::Connection(const Address& address, MapDatabase::Access access)
 
 void Connection::reconnect() {
   prepared_.clear();
+  posted_ = 0;
   handle_.reset(connect(address_, is_interrupted_));
   is_given_up_ = false;
   is_listening_ = false;
@@ -164,6 +167,7 @@ void Connection::begin() {
 
 Result Connection::execute(const std::string& sql) const {
   check_not_given_up();
+  settle();
   PQsendQuery(handle_.get(), sql.c_str());
   return checked(answer());
 }
@@ -207,35 +211,57 @@ void Connection::wait_for_server(int events) const {
   }
 }
 
-Result Connection::answer() const {
-  PGconn* const server = handle_.get();
-  int unsent = PQflush(server);
-  for (; unsent > 0; unsent = PQflush(server)) {
+void Connection::flush() const {
+  int unsent = PQflush(handle_.get());
+  for (; unsent > 0; unsent = PQflush(handle_.get())) {
     wait_for_server(POLLIN | POLLOUT);
-    if (PQconsumeInput(server) == 0) break;
-  }
-  Result kept;
-  while (true) {
-    while (PQisBusy(server) != 0) {
-      wait_for_server(POLLIN);
-      if (PQconsumeInput(server) == 0) break;
-    }
-    Result next(PQgetResult(server));
-    if (!next) return kept;
-    if (!kept || PQresultStatus(kept.get()) != PGRES_FATAL_ERROR) kept = std::move(next);
+    if (PQconsumeInput(handle_.get()) == 0) break;
   }
 }
 
-Result Connection::run(const std::string& sql, const std::vector<Parameter>& parameters) const {
-  check_not_given_up();
-  auto found = prepared_.find(sql);
-  const auto size = static_cast<int>(parameters.size());
-  if (found == prepared_.end()) {
-    const std::string name = fmt::format("s{}", prepared_.size());
-    PQsendPrepare(handle_.get(), name.c_str(), sql.c_str(), size, nullptr);
-    checked(answer());
-    found = prepared_.emplace(sql, name).first;
+Result Connection::next_answer() const {
+  while (PQisBusy(handle_.get()) != 0) {
+    wait_for_server(POLLIN);
+    if (PQconsumeInput(handle_.get()) == 0) break;
   }
+  return Result(PQgetResult(handle_.get()));
+}
+
+Result Connection::answer() const {
+  flush();
+  Result kept;
+  while (Result next = next_answer()) {
+    if (!kept || PQresultStatus(kept.get()) != PGRES_FATAL_ERROR) kept = std::move(next);
+  }
+  return kept;
+}
+
+void Connection::settle() const {
+  if (std::exchange(posted_, 0) == 0) return;
+  Result failed;
+  is_given_up_ = PQpipelineSync(handle_.get()) == 0;
+  if (is_given_up_) (void)checked(std::move(failed));
+  flush();
+  while (PQstatus(handle_.get()) == CONNECTION_OK) {
+    Result next = next_answer();  // null between the answers to two statements
+    const ExecStatusType status = PQresultStatus(next.get());
+    if (next && status == PGRES_PIPELINE_SYNC) break;
+    if (next && status == PGRES_FATAL_ERROR && !failed) failed = std::move(next);
+  }
+  PQexitPipelineMode(handle_.get());
+  if (failed || PQstatus(handle_.get()) != CONNECTION_OK) (void)checked(std::move(failed));
+}
+
+void Connection::prepare(const std::string& sql, std::size_t parameters) const {
+  if (prepared_.contains(sql)) return;
+  settle();
+  const std::string name = fmt::format("s{}", prepared_.size());
+  PQsendPrepare(handle_.get(), name.c_str(), sql.c_str(), static_cast<int>(parameters), nullptr);
+  (void)checked(answer());
+  prepared_.emplace(sql, name);
+}
+
+void Connection::send(const std::string& sql, const std::vector<Parameter>& parameters) const {
   std::vector<const char*> values;
   std::vector<int> sizes;
   for (const Parameter& value : parameters) {
@@ -243,9 +269,39 @@ Result Connection::run(const std::string& sql, const std::vector<Parameter>& par
     sizes.push_back(value ? static_cast<int>(value->size()) : 0);
   }
   const std::vector<int> formats(parameters.size(), kBinary);
-  PQsendQueryPrepared(handle_.get(), found->second.c_str(), size, values.data(), sizes.data(),
-                      formats.data(), kBinary);
+  PQsendQueryPrepared(handle_.get(), prepared_.at(sql).c_str(), static_cast<int>(parameters.size()),
+                      values.data(), sizes.data(), formats.data(), kBinary);
+}
+
+Result Connection::run(const std::string& sql, const std::vector<Parameter>& parameters) const {
+  check_not_given_up();
+  settle();
+  prepare(sql, parameters.size());
+  send(sql, parameters);
   return checked(answer());
+}
+
+void Connection::post(const std::string& sql, const std::vector<Parameter>& parameters) const {
+  if (posted_ == 0 && PQtransactionStatus(handle_.get()) != PQTRANS_INTRANS) {
+    (void)run(sql, parameters);
+    return;
+  }
+  check_not_given_up();
+  prepare(sql, parameters.size());
+  if (posted_ == 0) PQenterPipelineMode(handle_.get());
+  send(sql, parameters);
+  if (++posted_ >= kMaxPosted) settle();
+}
+
+void Connection::roll_back() const {
+  try {
+    settle();
+  } catch (const Error&) {  // of what is undone
+  }
+  try {
+    (void)execute("ROLLBACK");
+  } catch (const Error&) {
+  }
 }
 
 std::int64_t Connection::integer(const std::string& sql,

@@ -46,6 +46,13 @@ class Connection {
   /// Runs a statement with parameters $1, $2 and so on, which is prepared on its first use.
   Result run(const std::string& sql, const std::vector<Parameter>& parameters) const;
 
+  /// The same for a statement that gives no rows. In a transaction it is sent without a wait; the
+  /// next call that waits throws its Error.
+  void post(const std::string& sql, const std::vector<Parameter>& parameters) const;
+
+  /// Undoes the transaction. Nothing happens if the server is lost, and the transaction with it.
+  void roll_back() const;
+
   /// The first column of the first row; 0 if there is none.
   [[nodiscard]] std::int64_t integer(const std::string& sql,
                                      const std::vector<Parameter>& parameters = {}) const;
@@ -77,6 +84,13 @@ class Connection {
 
   /// The answer to what was sent; of several, the first that is an error, or the last.
   Result answer() const;
+  void flush() const;
+  /// Null after the last answer.
+  Result next_answer() const;
+  /// Waits for the answers to what was posted. Throws the Error of the first that failed.
+  void settle() const;
+  void prepare(const std::string& sql, std::size_t parameters) const;
+  void send(const std::string& sql, const std::vector<Parameter>& parameters) const;
   void check_not_given_up() const;
   /// Waits until the server may be read from, or written to. Throws Error.
   void wait_for_server(int events) const;
@@ -91,6 +105,7 @@ class Connection {
   std::atomic<bool> is_interrupted_ = false;
   std::unique_ptr<PGconn, Finish> handle_;
   mutable std::map<std::string, std::string> prepared_;  ///< names by statement
+  mutable int posted_ = 0;                               ///< statements without an answer so far
   std::chrono::milliseconds limit_{0};                   ///< of an answer; 0 = none
   bool is_listening_ = false;
   mutable bool is_given_up_ = false;  ///< an answer did not come in time
@@ -110,6 +125,7 @@ class FleetStatement final : public SqlStatement {
   bool step() override;
   Step step_if_readable() override { return step() ? Step::row : Step::end; }
   void reset() override { result_.reset(); }
+  void run() override { connection_.post(sql_, parameters_); }
 
   [[nodiscard]] std::int64_t integer(int column) const override;
   [[nodiscard]] double real(int column) const override;

@@ -55,10 +55,7 @@ class FleetDatabase::OpenTransaction final : public Transaction {
   ~OpenTransaction() override {
     if (!is_outer_ || has_ended_) return;
     database_.in_transaction_ = false;
-    try {
-      database_.connection_.execute("ROLLBACK");
-    } catch (const Error&) {  // the connection is gone, and the transaction with it
-    }
+    database_.connection_.roll_back();
   }
 
   OpenTransaction(const OpenTransaction&) = delete;

@@ -381,8 +381,7 @@ void write_loop(SqlStatement& row, const MapLoop& loop, const Checksum& checksum
   row.bind(7, std::int64_t{loop.matches});
   row.bind(8, std::int64_t{loop.inliers});
   row.bind(9, checksum.value());
-  row.step();
-  row.reset();
+  row.run();
 }
 
 void mark_linked(const MapDatabase& database, std::vector<MapSession>& sessions, Damage& damage) {
@@ -697,8 +696,7 @@ void RowWriter::write(const MapSession& session) {
   session_->bind(6, std::string_view(session.options));
   session_->bind(7, session.frames);
   session_->bind(8, checksum_of(session).value());
-  session_->step();
-  session_->reset();
+  session_->run();
 }
 
 void RowWriter::write(const MapPlace& place, const Features& features) {
@@ -708,14 +706,12 @@ void RowWriter::write(const MapPlace& place, const Features& features) {
   place.timestamp_s ? place_->bind(4, *place.timestamp_s) : place_->bind_null(4);
   place_->bind(5, content_bytes(place.content));
   place_->bind(6, checksum_of(place).value());
-  place_->step();
-  place_->reset();
+  place_->run();
   const std::vector<unsigned char> bytes = features_bytes(features);
   features_->bind(1, place.id);
   features_->bind(2, bytes);
   features_->bind(3, checksum_of(place.at).add(bytes).value());
-  features_->step();
-  features_->reset();
+  features_->run();
 }
 
 void RowWriter::write_image(const MapPlace& place, std::span<const unsigned char> jpeg) {
@@ -723,8 +719,7 @@ void RowWriter::write_image(const MapPlace& place, std::span<const unsigned char
   image_->bind(1, place.id);
   image_->bind(2, jpeg);
   image_->bind(3, checksum_of_image(jpeg, place.at).value());
-  image_->step();
-  image_->reset();
+  image_->run();
 }
 
 void RowWriter::write(const MapLoop& loop) { write_loop(*loop_, loop, checksum_of(loop)); }
@@ -741,8 +736,7 @@ void RowWriter::write(const MapOdometry& odometry) {
   odometry.timestamp_s ? odometry_->bind(3, *odometry.timestamp_s) : odometry_->bind_null(3);
   odometry_->bind(4, bytes_of(numbers));
   odometry_->bind(5, checksum_of(odometry, bytes_of(numbers)).value());
-  odometry_->step();
-  odometry_->reset();
+  odometry_->run();
 }
 
 void RowWriter::write(const MapLoopPose& pose) {
@@ -755,15 +749,13 @@ void RowWriter::write(const MapLoopPose& pose) {
   relative_pose_->bind(5, to_string(pose.measured.known));
   relative_pose_->bind(6, bytes_of(numbers));
   relative_pose_->bind(7, checksum_of(pose, bytes_of(numbers)).value());
-  relative_pose_->step();
-  relative_pose_->reset();
+  relative_pose_->run();
 }
 
 void RowWriter::write_linked(int session) {
   linked_->bind(1, std::int64_t{session});
   linked_->bind(2, checksum_of_linked(session).value());
-  linked_->step();
-  linked_->reset();
+  linked_->run();
 }
 
 void remove_place(const MapDatabase& database, std::int64_t place) {

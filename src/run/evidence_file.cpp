@@ -89,8 +89,7 @@ class EvidenceWriter::Impl {
     insert_->bind(3, stored.saliency_png);
     insert_->bind(4, bytes_of(std::span<const std::uint64_t>(stored.content.rows)));
     insert_->bind(5, bytes_of(std::span<const PointPair>(stored.inliers)));
-    insert_->step();
-    insert_->reset();
+    insert_->run();
     if (++pending_ == kFramesPerTransaction) save();
     return stored;
   }

@@ -34,6 +34,12 @@ class SqlStatement {
   /// The same, but what cannot be read of a damaged file or disk is no Error.
   virtual Step step_if_readable() = 0;
   virtual void reset() = 0;
+  /// Runs a statement that gives no rows, and resets it. In a transaction, a server may be told
+  /// later; then a later statement or the end of the transaction throws its Error.
+  virtual void run() {
+    step();
+    reset();
+  }
 
   [[nodiscard]] virtual std::int64_t integer(int column) const = 0;
   [[nodiscard]] virtual double real(int column) const = 0;
