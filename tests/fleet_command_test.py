@@ -552,10 +552,17 @@ class FleetTest(CommandTest):
                           "session 1 was moved to another server")
 
         back = ("map", "move", second, first, "--session", "1", "--session", "2")
-        with started(*back) as moving:
-            while moving.poll() is None:
-                for both in (f"{first} {second}", f"{second} {first}"):
-                    self.assertEqual(self.lines("query", both, *query), of_one)
+        folder = self.scratch / "arriving"
+        folder.mkdir()
+        with started("query", f"{first} {second}", "--watch", folder, *query[1:], "--map-cache-mb", 0) as watching:
+            for name in ("before.png", "after.png"):
+                (folder / name).symlink_to(query[0])
+                answer = {**json.loads(watching.stdout.readline()), "image": str(query[0])}
+                self.assertEqual(answer, json.loads(of_one[0]))
+                with started(*back) as moving:    # the second time, there is nothing to move
+                    while moving.poll() is None:
+                        for both in (f"{first} {second}", f"{second} {first}"):
+                            self.assertEqual(self.lines("query", both, *query), of_one)
         self.assertEqual(self.sessions(first, second), [[1, 2], []])
         self.server.sql("shard1", "SELECT setval('loopbit.session_number', 1, false)")
         self.lines("map", "merge", first, self.file)    # whose sessions get numbers that are free
