@@ -5,6 +5,7 @@
 import bisect
 import csv
 import itertools
+import math
 import subprocess
 import time
 
@@ -15,7 +16,8 @@ START_S = 4
 
 
 def percentile(values, fraction):
-    return sorted(values)[round(fraction * (len(values) - 1))]
+    """NaN if there are none."""
+    return sorted(values)[round(fraction * (len(values) - 1))] if values else math.nan
 
 
 def drive(program, views, map_path_of, robots, frames, folder):
@@ -70,5 +72,5 @@ def measure(server, loopbit, program, views, robots, seconds, folder):
     visible = list(delays_ms(driven, epochs))
     return {"writers": robots, "writers_frames": len(given), "writers_lost": len(given - epochs.keys()),
             "visible_p50_ms": f"{percentile(visible, 0.5):.0f}", "visible_p99_ms": f"{percentile(visible, 0.99):.0f}",
-            "visible_max_ms": f"{max(visible):.0f}", "writers_late_p99_ms": f"{percentile(late, 0.99):.1f}",
+            "visible_max_ms": f"{percentile(visible, 1):.0f}", "writers_late_p99_ms": f"{percentile(late, 0.99):.1f}",
             "writers_file_ms": f"{frame_ms(with_files):.2f}", "writers_server_ms": f"{frame_ms(driven):.2f}"}
