@@ -140,19 +140,8 @@ void bind_correction(py::module_& module) {
       "later sessions do not use them.");
 }
 
-}  // namespace
-
-void bind_map_tools(py::module_& module) {
-  bind_results(module);
-  bind_correction(module);
-  module.def(
-      "check_map", [](const Path& path) { return check_map(path.string()); }, py::arg("path"),
-      Free(), "Checks a map by reading every byte. Raises InputError like MapReader.");
-  module.def(
-      "recover_map",
-      [](const Path& path, const Path& to) { return recover_map(path.string(), to.string()); },
-      py::arg("path"), py::arg("to"), Free(),
-      "Copies all undamaged rows of a map to a new map, under the same numbers.");
+/// What brings the sessions of maps together.
+void bind_sessions(py::module_& module) {
   module.def(
       "merge_map",
       [](const Path& into, const Path& other) { return merge_map(into.string(), other.string()); },
@@ -181,6 +170,22 @@ void bind_map_tools(py::module_& module) {
       "them to the map. Each such session is processed again from its stored contents and "
       "features, with all earlier sessions as candidates. Without options, uses the settings that "
       "each session was recorded with. A session is added completely or not at all.");
+}
+
+}  // namespace
+
+void bind_map_tools(py::module_& module) {
+  bind_results(module);
+  bind_correction(module);
+  bind_sessions(module);
+  module.def(
+      "check_map", [](const Path& path) { return check_map(path.string()); }, py::arg("path"),
+      Free(), "Checks a map by reading every byte. Raises InputError like MapReader.");
+  module.def(
+      "recover_map",
+      [](const Path& path, const Path& to) { return recover_map(path.string(), to.string()); },
+      py::arg("path"), py::arg("to"), Free(),
+      "Copies all undamaged rows of a map to a new map, under the same numbers.");
   module.def(
       "compact_map",
       [](const Path& path, std::vector<int> drop_sessions, std::int64_t max_places,
