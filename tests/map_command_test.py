@@ -154,7 +154,7 @@ class MapCommandTest(CommandTest):
     def test_the_log_of_another_map_is_refused(self):
         town = self.copy_of_map()
         other = self.scratch / "other.db"
-        with subprocess.Popen([LOOPBIT, "run", self.laps[0], "--map", other, "--no-report"],
+        with subprocess.Popen([LOOPBIT, "run", self.images, "--map", other, "--no-report"],
                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as killed:
             log = self.scratch / "other.db-wal"
             while not log.exists() or log.stat().st_size < 100_000:
