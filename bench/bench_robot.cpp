@@ -60,17 +60,23 @@ class Robot {
     map_.for_each_earlier_loop([](const SessionFrame&, const SessionFrame&) {});
   }
 
-  /// Returns the epoch as of which it knows the map.
-  std::int64_t process(const View& view) {
+  struct Processed {
+    std::int64_t epoch;  ///< as of which it knows the map
+    double retrieval_s;  ///< among the places of others
+  };
+
+  Processed process(const View& view) {
     const MapNews news = map_.news();
     for (const auto& [at, content] : news.places) others_.add(content);
     const PlaceId frame = own_.size();
     (void)own_.query(view.content, frame);
+    const double begin_s = now_s();
     const auto similar = others_.query(view.content, others_.size());
+    const double retrieval_s = now_s() - begin_s;
     if (!similar.empty()) (void)map_.features(-1 - similar.front().place);
     own_.add(view.content);
     map_.add({.frame = frame, .status = Status::low_score}, view.content, view.features, {});
-    return news.epoch;
+    return {.epoch = news.epoch, .retrieval_s = retrieval_s};
   }
 
   void finish() {
@@ -100,14 +106,14 @@ void run(const std::vector<std::string>& arguments) {
   Robot robot(arguments[2], out_path + ".queue.db");
   if (now_s() > begin_s) throw std::runtime_error("the robot was not ready in time");
   auto out = fmt::output_file(out_path);
-  out.print("session,frame,arrival_s,start_s,done_s,epoch\n");
+  out.print("session,frame,arrival_s,start_s,done_s,retrieval_s,epoch\n");
   for (std::size_t frame = 0; frame < frames; ++frame) {
     const double arrival_s = begin_s + static_cast<double>(frame) / rate_hz;
     std::this_thread::sleep_for(Seconds(arrival_s - now_s()));
     const double start_s = now_s();
-    const std::int64_t epoch = robot.process(views[frame % views.size()]);
-    out.print("{},{},{:.6f},{:.6f},{:.6f},{}\n", robot.session(), frame, arrival_s, start_s,
-              now_s(), epoch);
+    const Robot::Processed processed = robot.process(views[frame % views.size()]);
+    out.print("{},{},{:.6f},{:.6f},{:.6f},{:.6f},{}\n", robot.session(), frame, arrival_s, start_s,
+              now_s(), processed.retrieval_s, processed.epoch);
   }
   robot.finish();
 }

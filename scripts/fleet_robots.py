@@ -48,7 +48,7 @@ def delays_ms(driven, epochs):
 
 
 def frame_ms(driven):
-    times = [1e3 * (row["done_s"] - row["start_s"]) for rows in driven for row in rows]
+    times = [1e3 * (row["done_s"] - row["start_s"] - row["retrieval_s"]) for rows in driven for row in rows]
     return sum(times) / len(times)
 
 
