@@ -583,7 +583,6 @@ class CommandLineTest(CommandTest):
                     self.assertIn(f"'{video}' is cut off after {size} of", told)
                 self.assertEqual("cut off" in ran.stdout, name == "cut")
 
-    @repeats_when_sanitized
     def test_only_regular_files_are_waited_for(self):
         for name in ("v.avi", "v.png", "list.txt"):
             pipe = self.scratch / name
@@ -869,7 +868,6 @@ class CommandLineTest(CommandTest):
                 ran = loopbit("run", self.images, "--out", self.out, "--set", setting)
                 self.assert_fails(ran, 2, words)
 
-    @repeats_when_sanitized
     def test_bad_settings_files(self):
         for text, words in [("{", "not valid JSON"), ("[]", "object"),
                             ('{"surf": {"upright": 3}}', "surf.upright is '3'"),

@@ -520,7 +520,6 @@ class MapCommandTest(CommandTest):
         self.assert_fails(loopbit("map", "check", text, "--recover", new), 3, text, "copy")
         self.assertFalse(new.exists())
 
-    @repeats_when_sanitized
     def test_files_that_are_no_maps_are_named(self):
         text = self.scratch / "text.db"
         text.write_text("no map " * 1000)
