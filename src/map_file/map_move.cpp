@@ -93,7 +93,7 @@ void remove_session(const MapDatabase& map, int session) {
        {"linked", "relative_pose", "odometry", "rejected", "loop", "place", "session"}) {
     const auto row = map.prepare(fmt::format("DELETE FROM {} WHERE session = ?1", table));
     row->bind(1, std::int64_t{session});
-    row->step();
+    row->run();
   }
 }
 
@@ -248,7 +248,7 @@ class SessionMove {
     const auto row = source_->prepare("INSERT INTO moved (uid, session) VALUES (?1, ?2)");
     row->bind(1, std::string_view(moved.uid));
     row->bind(2, std::int64_t{moved.session});
-    row->step();
+    row->run();
     transaction->end();
   }
 
@@ -258,7 +258,7 @@ class SessionMove {
     const auto statement = map.prepare(sql);
     int number = 0;
     (statement->bind(++number, std::string_view(texts)), ...);
-    statement->step();
+    statement->run();
   }
 
   std::unique_ptr<MapDatabase> source_;

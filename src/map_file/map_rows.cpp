@@ -762,7 +762,7 @@ void remove_place(const MapDatabase& database, std::int64_t place) {
   for (const char* table : {"features", "image", "place"}) {
     const auto row = database.prepare(fmt::format("DELETE FROM {} WHERE place = ?1", table));
     row->bind(1, place);
-    row->step();
+    row->run();
   }
   const auto left = database.prepare("SELECT session FROM place WHERE place = ?1");
   left->bind(1, place);
