@@ -470,10 +470,38 @@ class FleetTest(CommandTest):
         self.assert_fails(loopbit("query", f"{addresses[0]} {self.town}", images[0]), 2, "Session 1 in",
                           "is another one", "--first-session")
         self.assert_fails(loopbit("query", " ".join(addresses), images[0], "--epoch", "1"), 2, "one address")
-        for command in (("map", "export"), ("map", "create"), ("run", self.images, "--map")):
+        for command in (("map", "export"), ("map", "create")):
             ran = loopbit(*command, " ".join((dead, addresses[0])), cwd=self.scratch)
             self.assert_fails(ran, 2, "are several maps", shown)
             self.assertNotIn("secret", ran.stdout + ran.stderr)
+
+    def test_runs_on_several_servers_answer_as_with_one_map(self):
+        addresses, one = self.new_shards()
+        for number in (3, 4):
+            self.server.sql("postgres", f"CREATE DATABASE shard{number}")
+            self.addCleanup(self.server.sql, "postgres", f"DROP DATABASE shard{number} WITH (FORCE)")
+            addresses.append(self.server.address(f"shard{number}"))
+            self.lines("map", "create", addresses[-1], "--first-session", number)
+        shown = [self.server.address(f"shard{number}", password=None) for number in (1, 2, 3, 4)]
+        first, second, third, fourth = addresses
+        dead = "postgresql://robot1:secret@127.0.0.1:1/town"
+        self.lines("run", self.images, "--map", one, "--out", self.scratch / "of_one", "--no-report", "--quiet")
+        ran = loopbit("run", self.images, "--map", " ".join((third, second, dead, fourth, first)), "--out", self.out,
+                      "--no-report", "--quiet")
+        self.assertEqual(ran.returncode, 0, ran.stderr)
+        self.assertRegex(ran.stderr, "^loopbit: 'postgresql://robot1@127.0.0.1:1/town' cannot be read .*refused.*\n$")
+        self.assertEqual(decisions(self.out), decisions(self.scratch / "of_one"))
+        matched = {row["match"].split(":")[0] for row in decisions(self.out) if ":" in row["match"]}
+        self.assertTrue(QUICK or matched >= {"1", "2"}, matched)
+        record = json.loads((self.out / "run.json").read_text())
+        self.assertEqual(record["map"], {"path": " ".join([shown[2], shown[1], "postgresql://robot1@127.0.0.1:1/town",
+                                                          shown[3], shown[0]]),
+                                         "not_asked": ["postgresql://robot1@127.0.0.1:1/town"], "session": 3})
+        self.assertEqual(self.sessions(*addresses), [[1], [2], [3], []])
+        self.assertRegex(self.lines("map", "check", third)[-1], "^whole ")
+        image = sorted(self.images.iterdir())[3]
+        query = (image, "--json", "--places", "30")
+        self.assertEqual(self.lines("query", " ".join(addresses), *query), self.lines("query", one, *query))
 
     def test_several_servers_are_shown_together(self):
         addresses, _ = self.new_shards()

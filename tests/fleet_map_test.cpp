@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -38,17 +39,40 @@ class FleetMap : public ScratchTest {
   }
 
   /// The first value of what the statements give.
-  std::string sql(const std::string& statements) const {
-    const std::unique_ptr<PGconn, decltype(&PQfinish)> connection(PQconnectdb(address.c_str()),
-                                                                  PQfinish);
+  std::string sql(const std::string& statements, const std::string& at = "") const {
+    const std::unique_ptr<PGconn, decltype(&PQfinish)> connection(
+        PQconnectdb((at.empty() ? address : at).c_str()), PQfinish);
     const std::unique_ptr<PGresult, decltype(&PQclear)> result(
         PQexec(connection.get(), statements.c_str()), PQclear);
     EXPECT_LE(PQresultStatus(result.get()), PGRES_TUPLES_OK) << PQerrorMessage(connection.get());
     return PQntuples(result.get()) > 0 ? PQgetvalue(result.get(), 0, 0) : "";
   }
 
+  /// Another map, whose sessions count from 101.
+  std::string second_address() const {
+    std::string second = address;
+    second.replace(second.rfind('/') + 1, std::string::npos, "other");
+    sql("DROP DATABASE IF EXISTS other WITH (FORCE)");
+    sql("CREATE DATABASE other");
+    EXPECT_TRUE(create_map(second, 101));
+    return second;
+  }
+
   std::string address = std::getenv("LOOPBIT_FLEET_ADDRESS");
 };
+
+/// What a robot learns until it has so many places of others.
+MapNews learn(MapWriter& map, std::size_t places) {
+  MapNews all;
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+  while (all.places.size() < places && std::chrono::steady_clock::now() < end) {
+    const MapNews news = map.news();
+    all.places.insert(all.places.end(), news.places.begin(), news.places.end());
+    all.loops.insert(all.loops.end(), news.loops.begin(), news.loops.end());
+  }
+  EXPECT_EQ(all.places.size(), places);
+  return all;
+}
 
 TEST_F(FleetMap, KeepsWhatWasWritten) {
   add_session(address, 70, "first", std::nullopt, encode_image);
@@ -191,6 +215,115 @@ TEST_F(FleetMap, ARobotLearnsWhatOthersAddMeanwhile) {
   learn_until(7);
   EXPECT_EQ(all.places.size(), 4U);
   EXPECT_EQ(me.unverified(), 0);
+}
+
+TEST_F(FleetMap, ARobotRecognisesPlacesOfSeveralServers) {
+  const std::string other = second_address();
+  add_session(other, 4, "far", SessionFrame{101, 0});
+  add_session(address, 5, "near", SessionFrame{1, 0});
+  MapWriter me(address + " " + other, fast_options(), "me", {}, 0);
+  EXPECT_EQ(me.session(), 2);
+  std::vector<SessionFrame> seen;
+  me.for_each_earlier_place(
+      [&](const SessionFrame& at, const BinaryContent&) { seen.push_back(at); });
+  ASSERT_EQ(seen.size(), 9U);
+  EXPECT_EQ(seen[4], (SessionFrame{1, 4}));
+  EXPECT_EQ(seen[5], (SessionFrame{101, 0}));
+  std::vector<int> sessions;
+  me.for_each_earlier_loop(
+      [&](const SessionFrame& query, const SessionFrame&) { sessions.push_back(query.session); });
+  EXPECT_EQ(sessions, (std::vector{1, 101}));
+  EXPECT_EQ(me.epoch(), 0);
+  EXPECT_TRUE(same_features(*me.features(2), few_features(2)));
+  EXPECT_TRUE(same_features(*me.features(8), few_features(3)));
+  expect_error(ErrorKind::option, {"Session 101", "only read"}, [&] { me.remove(8); });
+  expect_error(ErrorKind::option, {"Session 101", "only read"}, [&] {
+    me.reject({101, 3}, {101, 0});
+  });
+
+  MapWriter robot(other, fast_options(), "robot");
+  for (int frame = 0; frame < 3; ++frame) {
+    add_frame(robot, frame, frame == 1 ? std::optional(SessionFrame{101, 0}) : std::nullopt);
+  }
+  robot.finish();
+  const MapNews news = learn(me, 3);
+  EXPECT_EQ(news.epoch, 0);
+  EXPECT_EQ(news.places[2].at, (SessionFrame{102, 2}));
+  EXPECT_EQ(news.loops.size(), 1U);
+  move_sessions(other, address, {102});
+  MapWriter next(address, fast_options(), "next");  // whose place comes after those that were moved
+  add_frame(next, 0);
+  next.finish();
+  EXPECT_EQ(learn(me, 1).places[0].at, (SessionFrame{3, 0}));
+  EXPECT_TRUE(same_features(*me.features(-3), few_features(2)));
+
+  add_frame(me, 0, SessionFrame{101, 3});
+  me.finish();
+  EXPECT_EQ(me.unverified(), 0);
+  EXPECT_TRUE(me.not_asked().empty());
+  MapReader map(address);
+  EXPECT_EQ(map.sessions().size(), 4U);
+  EXPECT_TRUE(map.sessions()[1].linked);
+  EXPECT_EQ(map.loops().back().match, (SessionFrame{101, 3}));
+  EXPECT_EQ(check_map(address).damage, std::vector<std::string>{});
+}
+
+TEST_F(FleetMap, AQueueWithLoopsToAnotherServerIsMerged) {
+  const std::string other = second_address();
+  add_session(other, 4, "far");
+  MapWriter map(address + " " + other, fast_options(), "second");
+  map.set_queue(path("queue.db"));
+  map.for_each_earlier_place([](const SessionFrame&, const BinaryContent&) {});
+  map.for_each_earlier_loop([](const SessionFrame&, const SessionFrame&) {});
+  sql("ALTER TABLE loopbit.place ADD CONSTRAINT is_full CHECK (false) NOT VALID");
+  add_frame(map, 0, SessionFrame{101, 3});
+  map.finish();
+  ASSERT_EQ(map.queue(), path("queue.db"));
+  sql("ALTER TABLE loopbit.place DROP CONSTRAINT is_full");
+  const MergeCounts counts = merge_map(address, map.queue());
+  EXPECT_EQ(counts.sessions, 1);
+  EXPECT_EQ(counts.loops, 1);
+  MapReader merged(address);
+  ASSERT_EQ(merged.sessions().size(), 1U);
+  ASSERT_EQ(merged.loops().size(), 1U);
+  EXPECT_EQ(merged.loops()[0].match, (SessionFrame{101, 3}));
+}
+
+TEST_F(FleetMap, AServerThatIsAwayIsNamed) {
+  const std::string other = second_address();
+  add_session(address, 3);
+  add_session(other, 4);
+  const std::string away = "postgresql://robot:secret@127.0.0.1:1/town";
+  MapWriter map(fmt::format("{} {} {}", address, away, other), fast_options(), "me", {}, 0);
+  ASSERT_EQ(map.take_notices().size(), 1U);
+  EXPECT_EQ(map.not_asked(), std::vector<std::string>{"postgresql://robot@127.0.0.1:1/town"});
+  std::size_t places = 0;
+  map.for_each_earlier_place([&](const SessionFrame&, const BinaryContent&) { ++places; });
+  map.for_each_earlier_loop([](const SessionFrame&, const SessionFrame&) {});
+  EXPECT_EQ(places, 7U);
+  const auto wait_until = [](const auto& is_so) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!is_so() && std::chrono::steady_clock::now() < end) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    EXPECT_TRUE(is_so());
+  };
+  sql("ALTER DATABASE other WITH ALLOW_CONNECTIONS false; SELECT pg_terminate_backend(pid) FROM "
+      "pg_stat_activity WHERE datname = 'other'");
+  wait_until([&] { return map.features(6)->keypoints.empty(); });
+  wait_until([&] {
+    map.news();
+    return map.not_asked().size() == 2;
+  });
+  EXPECT_TRUE(same_features(*map.features(2), few_features(2)));
+  EXPECT_GT(map.unverified(), 0);
+  add_frame(map, 0);
+  map.flush();
+  sql("ALTER DATABASE other WITH ALLOW_CONNECTIONS true");
+  wait_until([&] { return !map.features(6)->keypoints.empty(); });
+  add_session(other, 1);
+  EXPECT_EQ(learn(map, 1).places[0].at, (SessionFrame{102, 0}));
+  EXPECT_EQ(map.take_notices().size(), 2U);  // it is lost, and back
 }
 
 TEST_F(FleetMap, AReaderSeesTheMapAsOfAnEpoch) {

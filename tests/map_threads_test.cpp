@@ -17,10 +17,10 @@
 #include "loopbit/map_tools.hpp"
 
 #include "batch_writer.hpp"
-#include "features_ahead.hpp"
 #include "file_database.hpp"
 #include "map_schema.hpp"
 #include "map_support.hpp"
+#include "server_features.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
@@ -178,16 +178,24 @@ void write_frames(const std::string& map_path, int frames) {
   writer.close();
 }
 
+std::unique_ptr<MapDatabase> map_without_features(const std::string& path) {
+  write_frames(path, 1);
+  change(path, "DELETE FROM features");
+  return open_map(path, MapDatabase::Access::read);
+}
+
 TEST_F(MapThreads, FeaturesAlongAPathAreReadAhead) {
   constexpr int kFrames = 40;
   constexpr std::chrono::seconds kMost{60};
   const std::string map_path = path("map.db");
   write_frames(map_path, kFrames);
+  const auto other_map = map_without_features(path("without.db"));
+  Damage damage;
   for (const int step : {1, -1, 3}) {
-    FeaturesAhead ahead(open_map(map_path, MapDatabase::Access::read));
+    ServerFeatures ahead(open_map(map_path, MapDatabase::Access::read), *other_map);
     const auto is_ahead = [&](std::int64_t place) {
-      const auto features = ahead.take(place, kMost);
-      if (!features) return false;
+      const auto features = ahead.take(place, {}, kMost, damage);
+      if (features->keypoints.empty()) return false;
       EXPECT_EQ(features->descriptors, few_features(static_cast<int>(place) - 1).descriptors);
       return true;
     };
@@ -205,18 +213,23 @@ TEST_F(MapThreads, NothingIsReadAheadWhileTheMapCannotBeRead) {
   constexpr std::chrono::seconds kMost{60};
   const std::string map_path = path("map.db");
   write_frames(map_path, 40);
-  FeaturesAhead ahead(open_map(map_path, MapDatabase::Access::read));
+  const auto other_map = map_without_features(path("without.db"));
+  Damage damage;
+  ServerFeatures ahead(open_map(map_path, MapDatabase::Access::read), *other_map);
+  const auto is_ahead = [&](std::int64_t place) {
+    return !ahead.take(place, {}, kMost, damage)->keypoints.empty();
+  };
   change(map_path, "ALTER TABLE features RENAME TO lost_features");
   const auto begin = std::chrono::steady_clock::now();
-  for (int place = 1; place <= 20; ++place) EXPECT_EQ(ahead.take(place, kMost), nullptr) << place;
+  for (int place = 1; place <= 20; ++place) EXPECT_FALSE(is_ahead(place)) << place;
   EXPECT_LT(std::chrono::steady_clock::now() - begin, kMost);
   change(map_path, "ALTER TABLE lost_features RENAME TO features");
-  std::shared_ptr<const Features> features;
-  for (int place = 21; !features && place <= 40; ++place) {
+  bool is_back = false;
+  for (int place = 21; !is_back && place <= 40; ++place) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    features = ahead.take(place, kMost);
+    is_back = is_ahead(place);
   }
-  EXPECT_NE(features, nullptr);
+  EXPECT_TRUE(is_back);
 }
 
 }  // namespace

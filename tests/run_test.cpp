@@ -125,6 +125,7 @@ RunRecord full_record() {
                    .map_queue = "run/queue.db",
                    .map_queued_frames = 7,
                    .map_unverified = 8,
+                   .map_not_asked = {"postgresql://b.example/town"},
                    .stopped_by = "interrupt",
                    .wall_s = 1.5,
                    .arguments = {"run", "images"},

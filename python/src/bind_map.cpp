@@ -293,6 +293,9 @@ void bind_writer(py::module_& module) {
       .def_property_readonly(
           "unverified", py::cpp_function(&call<&MapWriter::unverified, SharedWriter>, Free()),
           "How often a place was no match because the server did not send its features in time.")
+      .def_property_readonly(
+          "not_asked", py::cpp_function(&call<&MapWriter::not_asked, SharedWriter>, Free()),
+          "Of several servers, those that did not answer, at the start or for a while.")
       .def("take_notices", &call<&MapWriter::take_notices, SharedWriter>, Free(),
            "Sentences on the server, for the user, since the last call.")
       .def("flush", &call<&MapWriter::flush, SharedWriter>, Free(),

@@ -14,6 +14,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/finished_run.hpp"
+#include "loopbit/map_server.hpp"
 #include "loopbit/mcap_export.hpp"
 #include "loopbit/run_input.hpp"
 #include "loopbit/write_file.hpp"
@@ -95,20 +96,21 @@ RunOutcome run_with_progress(RunInput& input, const SessionFlags& flags, LivePag
 void tell_of_server(const RunRecord& record) {
   if (record.map_unverified > 0) {
     tell(
-        fmt::format("loopbit: The server did not give the features of {} candidates in time; they "
+        fmt::format("loopbit: A server did not give the features of {} candidates in time; they "
                     "were left out.\n",
                     record.map_unverified));
   }
+  const std::string own = addresses_in(record.map_path).front();
   if (!record.map_queue.empty()) {
-    tell(fmt::format(
-        "loopbit: The server of '{0}' lacks {1} frames of session {2}, which are in "
-        "'{3}'; 'loopbit map merge {0} {3}' brings them there.\n",
-        record.map_path, record.map_queued_frames, record.map_session, record.map_queue));
+    tell(
+        fmt::format("loopbit: The server of '{0}' lacks {1} frames of session {2}, which are in "
+                    "'{3}'; 'loopbit map merge {0} {3}' brings them there.\n",
+                    own, record.map_queued_frames, record.map_session, record.map_queue));
   } else if (record.map_reconnections > 0) {
     tell(
         fmt::format("loopbit: The server of '{}' was lost and reached again {} times; all frames "
                     "are saved.\n",
-                    record.map_path, record.map_reconnections));
+                    own, record.map_reconnections));
   }
 }
 
@@ -130,7 +132,8 @@ void SessionFlags::add_to(CLI::App& command) {
   command
       .add_option("--map", run.map,
                   "Continue this map, or create it; or continue the one of a PostgreSQL database, "
-                  "postgresql://... Places of earlier sessions are recognised")
+                  "postgresql://... Places of earlier sessions are recognised; of several "
+                  "addresses in quotes, the first one gets the session")
       ->type_name("MAP");
   command.add_flag("--keep-images", run.keep_images, "Store a small JPEG of each place in the map")
       ->needs("--map");

@@ -174,6 +174,10 @@ MergePlan plan_of(const MapDatabase& to, const MapReader& source) {
   Damage damage;
   std::map<std::string, MapSession> known;
   std::string options;
+  // A session without frames may be one of another server, which a queue describes. Loops that lead
+  // to it keep its number.
+  const bool is_server = is_map_address(to.path());
+  std::vector<int> described;
   for (const MapSession& session : read_sessions(to, damage)) {
     known[session.uid] = session;
     options = session.options;
@@ -194,6 +198,8 @@ MergePlan plan_of(const MapDatabase& to, const MapReader& source) {
       } else {
         plan.whole.insert(session.session);
       }
+    } else if (is_server && session.frames == 0) {
+      described.push_back(session.session);
     } else {
       plan.added.push_back(session);
       // Those of `into` that come before it now are new to it.
@@ -203,6 +209,11 @@ MergePlan plan_of(const MapDatabase& to, const MapReader& source) {
   const std::vector<int> numbers = to.new_sessions(plan.added.size());
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     plan.numbers[plan.added[i].session] = numbers[i];
+  }
+  for (const int session : described) {
+    const bool is_other = std::ranges::any_of(
+        known, [&](const auto& each) { return each.second.session == session; });
+    if (!is_other) plan.numbers[session] = session;
   }
   return plan;
 }

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/map_file.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <ctime>
 #include <filesystem>
+#include <iterator>
 #include <map>
 #include <new>
 #include <random>
@@ -25,9 +27,8 @@
 #include "loopbit/version.hpp"
 
 #include "batch_writer.hpp"
-#include "features_ahead.hpp"
+#include "earlier_sessions.hpp"
 #include "file_database.hpp"
-#include "map_follower.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
 #include "searched_places.hpp"
@@ -64,8 +65,6 @@ std::string free_path(const std::string& path) {
   return free;
 }
 
-/// A frame waits no longer for features from a server.
-constexpr std::chrono::milliseconds kMaxWait{1000};
 /// Frames that are queued for a server should be there, and seen by other robots, within a second.
 constexpr std::chrono::milliseconds kMaxQueued{250};
 
@@ -81,7 +80,7 @@ struct MapReader::Impl {
         path(database->path()),
         features(*database),
         images(*database),
-        stored(*database, cache_mb),
+        stored(cache_mb),
         sessions(read_sessions(*database, damage)) {
     if (const std::string fault = database->fault(); !fault.empty()) damage.add(fault);
     if (database->has_search()) searched.emplace(*database, stored, damage);
@@ -240,7 +239,7 @@ void MapReader::for_each_earlier_loop(const VisitLoop& visit) {
 }
 
 std::shared_ptr<const Features> MapReader::features(PlaceId place) {
-  return impl_->stored.get(place, impl_->damage);
+  return impl_->stored.get(place, impl_->damage, impl_->features);
 }
 
 void MapReader::add(const Detection& /*detection*/, const BinaryContent& /*content*/,
@@ -266,14 +265,11 @@ class MapWriter::Impl {
     if (!stored_) return;
     if (writer_) writer_->flush();
     const bool is_whole = !upload_ || upload_->catch_up(is_stopped);
-    if (upload_) end_upload();
-    follower_.reset();
-    ahead_.reset();
+    keep_last();
+    earlier_.reset();
     stored_.reset();
     own_features_.reset();
     own_file_.reset();
-    snapshot_.reset();
-    database_.reset();
     server_.reset();
     if (writer_) writer_->close();
     if (!is_on_server_ || !is_whole) return;
@@ -311,31 +307,25 @@ class MapWriter::Impl {
 
   void for_each_earlier_place(const Visit& visit) {
     stored().begin(path_);
-    for_each_place(
-        *database_,
-        [&](const MapPlace& place) {
-          stored().add(place.id, place.at);
-          visit(place.at, place.content);
-        },
-        damage_);
-    refuse_damaged(path_, damage_.clauses());
+    earlier_->for_each_place([&](const MapPlace& place) {
+      stored().add(place.id, place.at);
+      visit(place.at, place.content);
+    });
   }
 
   void for_each_earlier_loop(const VisitLoop& visit) {
     (void)stored();  // not after finish()
-    for (const MapLoop& loop : read_loops(*database_, damage_)) visit(loop.query, loop.match);
-    refuse_damaged(path_, damage_.clauses());
-    snapshot_.reset();
+    for (const MapLoop& loop : earlier_->loops()) visit(loop.query, loop.match);
+    earlier_->end_snapshots();
   }
 
-  [[nodiscard]] std::int64_t epoch() const { return epoch_; }
+  [[nodiscard]] std::int64_t epoch() const { return earlier_ ? earlier_->epoch() : 0; }
 
   MapNews news() {
-    if (!follower_) return {};
-    MapFollower::News found = follower_->take();
-    for (MapSession& session : found.sessions) {
-      if (writer_) writer_->add_other(session);
-      sessions_[session.session] = std::move(session);
+    if (!earlier_) return {};
+    MapFollower::News found = earlier_->news();
+    if (writer_) {
+      for (const MapSession& session : found.sessions) writer_->add_other(session);
     }
     MapNews news{.epoch = found.epoch};
     for (const MapPlace& place : found.places) {
@@ -358,16 +348,26 @@ class MapWriter::Impl {
     if (writer_) {
       if (auto pending = writer_->pending(place - session_begin())) return pending;
     }
-    if (!is_on_server_) return stored().get(place, damage_);
-    return place < session_begin() ? fetch(place) : stored().get(place, damage_, own_features());
+    if (is_on_server_ && place >= session_begin()) {
+      return stored().get(place, queue_damage_, own_features());
+    }
+    const auto& [id, at] = stored().place(place);
+    if (id == StoredFeatures::kNoRow) return std::make_shared<const Features>();
+    const std::shared_ptr<const Features> read = earlier_->features(id, at);
+    if (!read) {
+      ++unverified_;
+      return std::make_shared<const Features>();
+    }
+    stored().keep(place, read);
+    return read;
   }
 
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& image) {
     StoredFeatures& places = stored();
-    snapshot_.reset();  // of a detector that did not ask for earlier loops
+    earlier_->end_snapshots();  // of a detector that did not ask for earlier loops
     places.reserve_next();
-    waited_ = {};
+    earlier_->begin_frame();
     writer().add({.content = content,
                   .detection = detection,
                   .features = features,
@@ -386,6 +386,7 @@ class MapWriter::Impl {
   }
 
   void remove(PlaceId place) {
+    refuse_elsewhere(stored().place(place).at.session);
     const std::int64_t id = stored().remove(place);
     if (id == StoredFeatures::kNoRow) return;
     change(place >= session_begin(),
@@ -405,7 +406,7 @@ class MapWriter::Impl {
     (void)stored();  // not after finish()
     for (SessionFrame* at : {&query, &match}) {
       if (at->session == 0) at->session = session_;
-      if (at->session == session_ || sessions_.contains(at->session)) continue;
+      if (at->session == session_ || earlier_->sessions().contains(at->session)) continue;
       throw Error(ErrorKind::option, fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' "
                                                  "shows those there are.",
                                                  path_, at->session));
@@ -416,12 +417,19 @@ class MapWriter::Impl {
     if (query.session == session_) {
       writer().change(rejection);  // the upload copies it
     } else {
+      refuse_elsewhere(query.session);
       change(false, rejection);
     }
   }
 
   [[nodiscard]] int session() const { return session_; }
-  [[nodiscard]] const Damage& damage() const { return damage_; }
+
+  [[nodiscard]] std::vector<std::string> damage() const {
+    std::vector<std::string> all = earlier_ ? earlier_->damage() : last_damage_;
+    all.insert(all.end(), queue_damage_.clauses().begin(), queue_damage_.clauses().end());
+    return all;
+  }
+
   [[nodiscard]] const std::string& queue() const { return queue_; }
   [[nodiscard]] std::int64_t unverified() const { return unverified_; }
 
@@ -435,21 +443,30 @@ class MapWriter::Impl {
   }
 
   std::vector<std::string> take_notices() {
-    return upload_ ? upload_->take_notices() : std::exchange(last_notices_, {});
+    std::vector<std::string> all = std::exchange(last_notices_, {});
+    const auto add = [&](std::vector<std::string> more) {
+      std::ranges::move(more, std::back_inserter(all));
+    };
+    if (earlier_) add(earlier_->take_notices());
+    if (upload_) add(upload_->take_notices());
+    return all;
+  }
+
+  [[nodiscard]] std::vector<std::string> not_asked() const {
+    if (!earlier_) return last_not_asked_;
+    return {earlier_->not_asked().begin(), earlier_->not_asked().end()};
   }
 
  private:
   void begin_session(const std::string& path, const std::string& name, std::size_t cache_mb) {
-    server_ = open_map(path, MapDatabase::Access::write);
+    const std::vector<std::string> paths = addresses_in(path);
+    server_ = open_map(paths.front(), MapDatabase::Access::write);
     path_ = server_->path();
     is_on_server_ = is_map_address(path);
-    check_sessions(*server_);
     const MapDatabase::NewSession begun = server_->begin_session();
     session_ = begun.session;
-    database_ = open_map(path, MapDatabase::Access::read);
-    snapshot_ = database_->snapshot();
-    check_sessions(*database_);  // others may have begun some meanwhile
-    stored_.emplace(*database_, cache_mb);
+    earlier_.emplace(paths, session_, options_);
+    stored_.emplace(cache_mb);
     begun_ = {.session = {.session = session_,
                           .uid = new_uid(),
                           .name = name,
@@ -457,36 +474,20 @@ class MapWriter::Impl {
                           .loopbit = kVersion,
                           .options = to_json(options_),
                           .linked = begun.is_linked},
-              .first_place = server_->place_key({session_, 0}, 0)};
-    for (const auto& [number, session] : sessions_) {
-      if (number < session_) begun_.earlier_frames += session.frames;
-    }
+              .first_place = server_->place_key({session_, 0}, 0),
+              .earlier_frames = earlier_->first_frames()};
     if (is_on_server_) {
-      follow(path);
-      queue_ = free_path(fmt::format("{}_session_{}_queue.db", map_stem(path), session_));
+      queue_ = free_path(fmt::format("{}_session_{}_queue.db", map_stem(paths.front()), session_));
     } else {
       writer_ = std::make_unique<BatchWriter>(std::move(server_), begun_.session,
                                               begun_.first_place, options_.odometry, encode_image_);
     }
   }
 
-  /// Begins to learn what others add to what the snapshot has.
-  void follow(const std::string& path) {
-    epoch_ = database_->epoch();
-    std::set<int> known;
-    for (const auto& [number, session] : sessions_) known.insert(number);
-    follower_ = std::make_unique<MapFollower>(
-        open_map(path, MapDatabase::Access::read), session_, epoch_, std::move(known),
-        [path = path_, options = options_](const MapSession& session) {
-          check_same_shape(path, session.options, options);
-        });
-    ahead_ = std::make_unique<FeaturesAhead>(open_map(path, MapDatabase::Access::read));
-  }
-
   /// Of a map on a server, the file that queues its rows is made by the first call.
   BatchWriter& writer() {
     if (writer_) return *writer_;
-    upload_ = std::make_unique<SessionUpload>(std::move(server_), *database_, begun_, queue_);
+    upload_ = std::make_unique<SessionUpload>(std::move(server_), begun_, queue_);
     MapSession queued = begun_.session;
     queued.linked = false;
     writer_ = std::make_unique<BatchWriter>(
@@ -494,7 +495,7 @@ class MapWriter::Impl {
         BatchOptions{.max_delay = kMaxQueued,
                      .on_commit = [this] { upload_->wake(std::exchange(changes_, {})); },
                      .path = queue_});
-    for (const auto& [number, session] : sessions_) writer_->add_other(session);
+    for (const auto& [number, session] : earlier_->sessions()) writer_->add_other(session);
     return *writer_;
   }
 
@@ -507,39 +508,14 @@ class MapWriter::Impl {
     });
   }
 
-  /// Features from the server; empty if it does not give them in time.
-  std::shared_ptr<const Features> fetch(PlaceId place) {
-    const bool is_lost = upload_ && upload_->is_reader_lost();
-    if (is_lost || waited_ >= kMaxWait) return missing();
-    const auto begin = std::chrono::steady_clock::now();
-    std::shared_ptr<const Features> read = ahead_->take(stored().row(place), kMaxWait - waited_);
-    if (read) {
-      stored().keep(place, read);
-    } else {
-      read = fetch_now(place, begin);
-    }
-    waited_ += std::chrono::steady_clock::now() - begin;
-    return read;
-  }
-
-  /// `begin`: of the wait for them.
-  std::shared_ptr<const Features> fetch_now(PlaceId place,
-                                            std::chrono::steady_clock::time_point begin) {
-    const auto left = kMaxWait - waited_ - (std::chrono::steady_clock::now() - begin);
-    database_->set_time_limit(
-        std::max(std::chrono::ceil<std::chrono::milliseconds>(left), std::chrono::milliseconds{1}));
-    try {
-      return stored().get(place, damage_);
-    } catch (const Error&) {
-      (void)writer();  // whose upload reaches the server again
-      upload_->set_reader_lost();
-      return missing();
-    }
-  }
-
-  std::shared_ptr<const Features> missing() {
-    ++unverified_;
-    return std::make_shared<const Features>();
+  /// Throws Error (kind option) if a session is on a server that is only read.
+  void refuse_elsewhere(int session) const {
+    if (!earlier_->is_elsewhere(session)) return;
+    throw Error(
+        ErrorKind::option,
+        fmt::format("Session {0} is on '{1}', which is only read, since '{2}' is named before "
+                    "it; open '{1}' to change it.",
+                    session, earlier_->server_of(session), path_));
   }
 
   /// Of frames of this session that are queued.
@@ -551,19 +527,15 @@ class MapWriter::Impl {
     return *own_features_;
   }
 
-  void end_upload() {
-    last_notices_ = upload_->take_notices();
+  /// What is asked after finish(), too.
+  void keep_last() {
+    last_notices_ = take_notices();
+    last_damage_ = earlier_->damage();
+    last_not_asked_ = not_asked();
+    if (!upload_) return;
     last_reconnections_ = upload_->reconnections();
     last_saved_frames_ = upload_->saved_frames();
     upload_.reset();
-  }
-
-  /// Throws Error (kind option) if they were made with other settings.
-  void check_sessions(const MapDatabase& database) {
-    for (const MapSession& session : read_sessions(database, damage_)) {
-      check_same_shape(path_, session.options, options_);
-      sessions_[session.session] = session;
-    }
   }
 
   /// Throws Error (kind option) after finish().
@@ -584,30 +556,28 @@ class MapWriter::Impl {
   LoopDetectorOptions options_;  ///< of the session
   EncodeImage encode_image_;
   bool is_on_server_ = false;
-  std::map<int, MapSession> sessions_;  ///< earlier ones
   int session_ = 0;
   SessionUpload::Begun begun_;
-  PlaceId frames_ = 0;                                  ///< of this session
-  std::unique_ptr<MapDatabase> server_;                 ///< for writing; until something is written
-  std::unique_ptr<MapDatabase> database_;               ///< for reading; gone after finish()
-  std::unique_ptr<MapDatabase::Transaction> snapshot_;  ///< until all earlier places were read
+  PlaceId frames_ = 0;                      ///< of this session
+  std::unique_ptr<MapDatabase> server_;     ///< for writing; until something is written
+  std::optional<EarlierSessions> earlier_;  ///< gone after finish(), as is stored_
   std::optional<StoredFeatures> stored_;
-  Damage damage_;
+  std::int64_t unverified_ = 0;
 
   // Of a map on a server.
-  std::int64_t epoch_ = 0;  ///< of the snapshot
-  std::unique_ptr<MapFollower> follower_;
-  std::unique_ptr<FeaturesAhead> ahead_;
   std::string queue_;                      ///< the file; empty when the server has all of it
   std::unique_ptr<MapDatabase> own_file_;  ///< the same, for reading
   std::optional<FeatureReader> own_features_;
-  std::chrono::nanoseconds waited_{};  ///< for features, since the last frame was added
-  std::int64_t unverified_ = 0;
+  Damage queue_damage_;
   std::vector<SessionUpload::Change> changes_;  ///< for the writer's thread
   std::unique_ptr<SessionUpload> upload_;
-  int last_reconnections_ = 0;  ///< of the upload, when it has ended
+
+  // After finish().
+  int last_reconnections_ = 0;
   std::int64_t last_saved_frames_ = 0;
   std::vector<std::string> last_notices_;
+  std::vector<std::string> last_damage_;
+  std::vector<std::string> last_not_asked_;
 
   std::unique_ptr<BatchWriter> writer_;  ///< last: its thread uses the others
 };
@@ -639,6 +609,7 @@ int MapWriter::reconnections() const { return impl().reconnections(); }
 std::int64_t MapWriter::unverified() const { return impl().unverified(); }
 const std::string& MapWriter::queue() const { return impl().queue(); }
 void MapWriter::set_queue(const std::string& path) { impl().set_queue(path); }
+std::vector<std::string> MapWriter::not_asked() const { return impl().not_asked(); }
 std::vector<std::string> MapWriter::take_notices() { return impl().take_notices(); }
 void MapWriter::add_pose(const MapLoopPose& pose) { impl().add_pose(pose); }
 void MapWriter::flush() { impl().flush(); }
@@ -646,7 +617,7 @@ void MapWriter::finish() { impl().finish(); }
 void MapWriter::finish_unless(const std::function<bool()>& is_stopped) {
   impl().finish(is_stopped);
 }
-const std::vector<std::string>& MapWriter::damage() const { return impl().damage().clauses(); }
+std::vector<std::string> MapWriter::damage() const { return impl().damage(); }
 
 void MapWriter::check_options(const LoopDetectorOptions& options) { impl().check_options(options); }
 

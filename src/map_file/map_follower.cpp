@@ -7,7 +7,7 @@
 #include <iterator>
 #include <utility>
 
-#include "loopbit/error.hpp"
+#include <fmt/format.h>
 
 #include "server_limits.hpp"
 
@@ -68,11 +68,23 @@ void MapFollower::run() {
       if (database_->is_lost()) database_->reconnect();
       follow();
       pause.reset();
-    } catch (const Error&) {  // the upload says so
+      note({});
+    } catch (const Error& error) {
+      note(error);
       std::unique_lock lock(mutex_);
       changed_.wait_for(lock, pause.next(), [this] { return stop_; });
     }
   }
+}
+
+/// How an attempt ended, if it is another way than the last one.
+void MapFollower::note(const std::optional<Error>& fault) {
+  if (std::exchange(is_lost_, fault.has_value()) == fault.has_value()) return;
+  const std::lock_guard lock(mutex_);
+  news_.notices.push_back(
+      fault ? fmt::format("Places of '{}' that were not read are no matches until it answers: {}",
+                          database_->path(), fault->what())
+            : fmt::format("'{}' answers again.", database_->path()));
 }
 
 /// Once. Throws Error if the server is lost.

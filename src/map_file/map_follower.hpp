@@ -7,11 +7,13 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "loopbit/error.hpp"
 #include "loopbit/map_database.hpp"
 #include "loopbit/map_file.hpp"
 
@@ -31,10 +33,11 @@ class MapFollower {
     std::vector<MapPlace> places = {};
     std::vector<MapLoop> loops = {};
     std::vector<MapLoop> rejected = {};
+    std::vector<std::string> notices = {};  ///< sentences: the server is lost, or it is back
   };
 
-  /// `session`: which is not news to the caller. `epoch`: what the caller knows. `known`: sessions.
-  /// `check(session)` throws Error for one whose places are of no use.
+  /// `session`: of the caller, which is not news. `epoch`: what the caller knows. `known`:
+  /// sessions. `check(session)` throws Error for one whose places are of no use.
   MapFollower(std::unique_ptr<MapDatabase> database, int session, std::int64_t epoch,
               std::set<int> known, std::function<void(const MapSession&)> check);
   /// Stops at once, whatever the server does.
@@ -51,6 +54,7 @@ class MapFollower {
   void run();
   void follow();
   void read(std::int64_t epoch);
+  void note(const std::optional<Error>& fault);
   [[nodiscard]] bool is_of_use(int session, News& news);
   [[nodiscard]] bool has_stopped() const;
 
@@ -60,7 +64,8 @@ class MapFollower {
   std::set<int> ignored_;
   std::function<void(const MapSession&)> check_;
   std::int64_t epoch_;  ///< that was read
-  Damage damage_;       ///< map_check finds it, too
+  bool is_lost_ = false;
+  Damage damage_;  ///< map_check finds it, too
 
   mutable std::mutex mutex_;  ///< guards all below
   std::condition_variable changed_;

@@ -61,7 +61,8 @@ class MapBefore : public MapStorage {
       : path_(std::move(path)),
         database_(database),
         session_(session),
-        stored_(database, kMapCache_mb) {}
+        reader_(database),
+        stored_(kMapCache_mb) {}
 
   void check_options(const LoopDetectorOptions& /*options*/) override {}  // link_map() does
 
@@ -84,7 +85,7 @@ class MapBefore : public MapStorage {
   }
 
   std::shared_ptr<const Features> features(PlaceId place) override {
-    return stored_.get(place, damage_);
+    return stored_.get(place, damage_, reader_);
   }
 
   /// The place that is processed next; null if the next frame has none.
@@ -106,6 +107,7 @@ class MapBefore : public MapStorage {
   std::string path_;
   const MapDatabase& database_;
   int session_;
+  FeatureReader reader_;
   StoredFeatures stored_;
   const MapPlace* next_ = nullptr;
   Damage damage_;

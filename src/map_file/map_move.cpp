@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -36,11 +35,6 @@ constexpr const char* kRows =
     "?1 UNION ALL SELECT 6, frame, 0, 0, checksum FROM odometry WHERE session = ?1 "
     "UNION ALL SELECT 7, frame, match_session, match_frame, checksum FROM relative_pose WHERE "
     "session = ?1";
-
-KeyRange places_of(const MapDatabase& map, int session) {
-  return {.first = map.place_key({session, 0}, 0),
-          .last = map.place_key({session, std::numeric_limits<int>::max()}, 0)};
-}
 
 /// Sorted. A checksum covers its row, so that equal lists are equal sessions.
 std::vector<Row> rows_of(const MapDatabase& map, int session) {

@@ -412,6 +412,11 @@ bool read_content(std::span<const unsigned char> bytes, BinaryContent& content) 
   return true;
 }
 
+KeyRange places_of(const MapDatabase& database, int session) {
+  return {.first = database.place_key({session, 0}, 0),
+          .last = database.place_key({session, std::numeric_limits<int>::max()}, 0)};
+}
+
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses) {
   if (clauses.empty()) return;
   const std::size_t more = clauses.size() - 1;

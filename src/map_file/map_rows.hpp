@@ -52,6 +52,9 @@ bool read_content(std::span<const unsigned char> bytes, BinaryContent& content);
 /// Throws Error (kind input) if there are `clauses`: a damaged map is neither continued nor copied.
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);
 
+/// The keys of a session's places on a server.
+KeyRange places_of(const MapDatabase& database, int session);
+
 /// Of an older map, no session but the first is linked.
 std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damage,
                                       const KeyRange& keys = {});

@@ -48,8 +48,8 @@ std::size_t find_address(const std::string& text) {
 const std::string& one_address(const std::string& path) {
   if (addresses_in(path).size() == 1) return path;
   throw Error(ErrorKind::option,
-              fmt::format("'{}' are several maps, which only 'loopbit query' and 'loopbit map "
-                          "info|list|check' (without --recover) take; give one.",
+              fmt::format("'{}' are several maps, which only 'loopbit run', 'loopbit query' and "
+                          "'loopbit map info|list|check' (without --recover) take; give one.",
                           without_secrets(path)));
 }
 
@@ -75,7 +75,7 @@ bool create_map(const std::string& address, int first_session) {
 }
 
 std::string map_stem(const std::string& path) {
-  if (is_map_address(path)) return server().name(one_address(path));
+  if (is_map_address(path)) return server().name(addresses_in(path).front());
   return std::filesystem::path(path).replace_extension().string();
 }
 

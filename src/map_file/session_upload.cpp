@@ -108,12 +108,8 @@ class QueuedRows {
   Ends next_{};
 };
 
-SessionUpload::SessionUpload(std::unique_ptr<MapDatabase> server, MapDatabase& reader, Begun begun,
-                             std::string queue)
-    : server_(std::move(server)),
-      reader_(reader),
-      begun_(std::move(begun)),
-      queue_(std::move(queue)) {
+SessionUpload::SessionUpload(std::unique_ptr<MapDatabase> server, Begun begun, std::string queue)
+    : server_(std::move(server)), begun_(std::move(begun)), queue_(std::move(queue)) {
   server_->set_time_limit(kMaxAnswer);
   thread_ = std::thread([this] { run(); });
 }
@@ -124,7 +120,6 @@ SessionUpload::~SessionUpload() {
     stop_ = true;
   }
   server_->interrupt();
-  reader_.interrupt();
   woken_.notify_all();
   thread_.join();
 }
@@ -134,12 +129,6 @@ void SessionUpload::wake(std::vector<Change> changes) {
   ++wakes_;
   changes_.insert(changes_.end(), std::move_iterator(changes.begin()),
                   std::move_iterator(changes.end()));
-  woken_.notify_all();
-}
-
-void SessionUpload::set_reader_lost() {
-  is_reader_lost_ = true;
-  const std::lock_guard lock(mutex_);
   woken_.notify_all();
 }
 
@@ -188,7 +177,7 @@ void SessionUpload::run() {
     if (fault_) {
       woken_.wait_for(lock, pause.next(), [&] { return stop_ || in_a_hurry_; });
     } else {
-      woken_.wait(lock, [&] { return stop_ || copied_ < wakes_ || is_reader_lost_; });
+      woken_.wait(lock, [&] { return stop_ || copied_ < wakes_; });
     }
     if (stop_) return;
     in_a_hurry_ = false;
@@ -236,11 +225,6 @@ bool SessionUpload::attempt() {
     was_lost = true;
     server_->reconnect();
     copy_all();
-  }
-  if (is_reader_lost_) {
-    reader_.set_time_limit(kMaxAnswer);
-    reader_.reconnect();
-    is_reader_lost_ = false;
   }
   return was_lost;
 }

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -37,11 +36,9 @@ class SessionUpload {
     std::int64_t earlier_frames = 0;  ///< of the sessions before it
   };
 
-  /// `server`: that holds the session. `reader`: another connection, which is reached again when
-  /// set_reader_lost() was called. It must outlive this. `queue`: the file, which need not be there
-  /// before the first wake().
-  SessionUpload(std::unique_ptr<MapDatabase> server, MapDatabase& reader, Begun begun,
-                std::string queue);
+  /// `server`: that holds the session. `queue`: the file, which need not be there before the first
+  /// wake().
+  SessionUpload(std::unique_ptr<MapDatabase> server, Begun begun, std::string queue);
   /// Stops at once, whatever the server does.
   ~SessionUpload();
   SessionUpload(const SessionUpload&) = delete;
@@ -69,10 +66,6 @@ class SessionUpload {
   /// Sentences for the user that nobody has taken yet.
   std::vector<std::string> take_notices();
 
-  /// While true, only this object uses the reader.
-  [[nodiscard]] bool is_reader_lost() const { return is_reader_lost_; }
-  void set_reader_lost();
-
  private:
   void run();
   bool attempt();
@@ -83,13 +76,11 @@ class SessionUpload {
   void note_change(const std::optional<Error>& fault);
 
   std::unique_ptr<MapDatabase> server_;
-  MapDatabase& reader_;
   Begun begun_;
   std::string queue_;
   std::unique_ptr<QueuedRows> rows_;  ///< for the thread only, like the next two
   bool is_sure_ = true;               ///< of what the server has
   std::size_t damage_ = 0;            ///< of the rows; so many clauses are in notices
-  std::atomic<bool> is_reader_lost_ = false;
 
   mutable std::mutex mutex_;  ///< guards all below
   std::condition_variable woken_;

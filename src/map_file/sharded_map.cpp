@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <future>
-#include <map>
 #include <optional>
 #include <utility>
 
@@ -15,6 +14,7 @@
 #include "loopbit/map_server.hpp"
 
 #include "server_limits.hpp"
+#include "session_owners.hpp"
 
 namespace loopbit {
 
@@ -42,52 +42,25 @@ ShardedMap::ShardedMap(const std::vector<std::string>& addresses, std::size_t ca
     }
   }
   if (notices_.size() == shards_.size()) throw Error(*first);
-  take_snapshots();
-  find_owners();
+  begin();
 }
 
 ShardedMap::~ShardedMap() = default;
 
-/// The first may lack a session that reaches one shard after its snapshot and leaves another one
-/// before. Then that one had it when the sessions were read the last time.
-void ShardedMap::take_snapshots() {
-  std::set<int> before;
-  std::set<int> now = sessions();
-  do {
-    before = std::move(now);
-    for (Shard& shard : shards_) ask(shard, [&] { shard.reader->begin_snapshot(); });
-    now = sessions();
-  } while (!std::ranges::includes(now, before));
-}
-
-std::set<int> ShardedMap::sessions() const {
-  std::set<int> numbers;
-  for (const Shard& shard : shards_) {
-    if (!shard.reader) continue;
-    for (const MapSession& session : shard.reader->sessions()) numbers.insert(session.session);
-  }
-  return numbers;
-}
-
-void ShardedMap::find_owners() {
-  std::map<int, const MapSession*> found;
-  for (std::uint32_t number = 0; number < shards_.size(); ++number) {
-    if (!shards_[number].reader) continue;
-    for (const MapSession& session : shards_[number].reader->sessions()) {
-      const auto [earlier, is_new] = found.emplace(session.session, &session);
-      if (!is_new && earlier->second->uid != session.uid) {
-        throw Error(
-            ErrorKind::option,
-            fmt::format("Session {} in '{}' is another one than in '{}': number the sessions of "
-                        "maps differently, by 'loopbit map create --first-session'.",
-                        session.session, shards_[owners_.at(session.session)].shown,
-                        shards_[number].shown));
-      }
-      if (!is_new && earlier->second->frames >= session.frames) continue;
-      earlier->second = &session;
-      owners_[session.session] = number;
+void ShardedMap::begin() {
+  const auto sessions = [this] {
+    std::vector<ServerSessions> all;
+    for (const Shard& shard : shards_) {
+      all.push_back({shard.shown, {}});
+      if (shard.reader) all.back().sessions = shard.reader->sessions();
     }
-  }
+    return all;
+  };
+  take_snapshots(numbers_of(sessions()), [&] {
+    for (Shard& shard : shards_) ask(shard, [&] { shard.reader->begin_snapshot(); });
+    return numbers_of(sessions());
+  });
+  owners_ = owners_of(sessions());
 }
 
 bool ShardedMap::is_copy(std::uint32_t shard, int session) const {

@@ -47,8 +47,7 @@ class FeatureCache {
 /// The features of a map's places, by the detector's numbers, with a cache.
 class StoredFeatures {
  public:
-  StoredFeatures(const MapDatabase& database, std::size_t cache_mb)
-      : reader_(database), cache_(cache_mb << 20U) {}
+  explicit StoredFeatures(std::size_t cache_mb) : cache_(cache_mb << 20U) {}
 
   /// Call this before add(). A second call throws Error (kind option), since the places of the map
   /// at `path` are numbered for one detector.
@@ -71,18 +70,19 @@ class StoredFeatures {
   /// Forgets the row of a place, and returns it.
   std::int64_t remove(PlaceId place) { return std::exchange(stored(place).id, kNoRow); }
 
-  [[nodiscard]] std::int64_t row(PlaceId place) { return stored(place).id; }
+  struct StoredPlace {
+    std::int64_t id = 0;  ///< of its row, or kNoRow
+    SessionFrame at;
+  };
+
+  [[nodiscard]] const StoredPlace& place(PlaceId place) { return stored(place); }
 
   [[nodiscard]] PlaceId size() const { return static_cast<PlaceId>(places_.size()); }
 
   /// Null if they would have to be read.
   std::shared_ptr<const Features> find(PlaceId place) { return cache_.find(place); }
 
-  /// Empty, with a clause in `damage`, if they are lost.
-  std::shared_ptr<const Features> get(PlaceId place, Damage& damage) {
-    return get(place, damage, reader_);
-  }
-  /// The same from another database.
+  /// Empty, with a clause in `damage`, if they are lost. `reader`: of the database with their row.
   std::shared_ptr<const Features> get(PlaceId place, Damage& damage, FeatureReader& reader);
 
   void keep(PlaceId place, std::shared_ptr<const Features> features) {
@@ -90,18 +90,12 @@ class StoredFeatures {
   }
 
  private:
-  struct StoredPlace {
-    std::int64_t id = 0;
-    SessionFrame at;
-  };
-
   [[nodiscard]] StoredPlace& stored(PlaceId place) {
     return place < 0 ? new_places_.at(static_cast<std::size_t>(-(place + 1)))
                      : places_.at(static_cast<std::size_t>(place));
   }
 
   bool has_begun_ = false;
-  FeatureReader reader_;
   FeatureCache cache_;
   std::vector<StoredPlace> places_;
   std::vector<StoredPlace> new_places_;  ///< place -1 comes first

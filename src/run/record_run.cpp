@@ -307,6 +307,7 @@ class RecordedRun {
     tell_notices(listener);
     record_.map_reconnections = map_->reconnections();
     record_.map_unverified = map_->unverified();
+    record_.map_not_asked = map_->not_asked();
     record_.map_queue = map_->queue();
     if (record_.map_queue.empty()) return;
     record_.map_queued_frames =

@@ -93,6 +93,7 @@ void transfer(Io& io, Record& record) {
   io.unless(std::string(), "/map/queue", record.map_queue);
   io.unless(std::int64_t{0}, "/map/queued_frames", record.map_queued_frames);
   io.unless(std::int64_t{0}, "/map/unverified", record.map_unverified);
+  io.unless(std::vector<std::string>(), "/map/not_asked", record.map_not_asked);
   io.unless(0, "/map/session", record.map_session);
   io.unless(std::string(), "/camera", record.camera);
   io.unless(std::string(), "/odometry", record.odometry);

@@ -187,10 +187,11 @@ class MapReader : public MapStorage {
 /// child every call throws Error (kind option).
 class MapWriter : public MapStorage {
  public:
-  /// Creates or continues the map at `path`. `name` describes the input of the session. An existing
-  /// map is not changed before the first commit. Throws Error: kind output if the map has a writer
-  /// or cannot be written, option if it was made with other settings of binary_content or surf,
-  /// input as MapReader does.
+  /// Creates or continues the map at `path`. Of several addresses of servers, separated by spaces,
+  /// the first one gets the session; the sessions of the others are recognised, too. `name`
+  /// describes the input of the session. An existing map is not changed before the first commit.
+  /// Throws Error: kind output if the map has a writer or cannot be written, option if it was made
+  /// with other settings of binary_content or surf, input as MapReader does.
   ///
   /// `encode_image`: if given, an image of each place is saved. It is called on the writer's thread
   /// with a copy made by halved_to_picture(), which costs add() about 0.1 ms. If it returns no
@@ -230,6 +231,9 @@ class MapWriter : public MapStorage {
   /// How often the features of a place could not be had.
   [[nodiscard]] std::int64_t unverified() const;
 
+  /// Of several servers, those that did not answer, at the start or for a while, without passwords.
+  [[nodiscard]] std::vector<std::string> not_asked() const;
+
   /// Sentences on the server, for the user, since the last call.
   std::vector<std::string> take_notices();
 
@@ -251,7 +255,7 @@ class MapWriter : public MapStorage {
   void finish_unless(const std::function<bool()>& is_stopped);
 
   /// The damage that features() found so far; see MapReader::damage().
-  [[nodiscard]] const std::vector<std::string>& damage() const;
+  [[nodiscard]] std::vector<std::string> damage() const;
 
   void check_options(const LoopDetectorOptions& options) override;
   /// A writer serves one LoopDetector: a second call throws Error (kind option). Both functions

@@ -51,7 +51,8 @@ void set_map_server(std::unique_ptr<const MapServer> server);
 /// The addresses of maps on several servers, separated by spaces; else `path` itself.
 [[nodiscard]] std::vector<std::string> addresses_in(const std::string& path);
 
-/// The database of a map on a server, the path of a file without its extension.
+/// The database of a map on a server, or on the first of several; the path of a file without its
+/// extension.
 [[nodiscard]] std::string map_stem(const std::string& path);
 
 /// A path, an argument or a line of text with no secret of a map's address in it.

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -79,10 +78,8 @@ class ShardedMap final : public MapStorage, private PlaceSearch {
                        std::size_t number) override;
   BinaryContent content(PlaceId place) override;
 
-  /// Begins a snapshot of each shard. Together, they have all sessions that move meanwhile.
-  void take_snapshots();
-  [[nodiscard]] std::set<int> sessions() const;
-  void find_owners();
+  /// Begins a snapshot of each shard. Together, they have all sessions.
+  void begin();
   /// Whether another shard's copy of the session counts.
   [[nodiscard]] bool is_copy(std::uint32_t shard, int session) const;
   [[noreturn]] void refuse_change() const;
@@ -95,7 +92,7 @@ class ShardedMap final : public MapStorage, private PlaceSearch {
   std::vector<Found<Known>> gather(const Read& read);
 
   std::vector<Shard> shards_;
-  std::map<int, std::uint32_t> owners_;  ///< by session; without those that no description names
+  std::map<int, std::size_t> owners_;  ///< by session; without those that no description names
   std::vector<Origin> places_;
   std::vector<std::string> notices_;
 };

@@ -74,8 +74,9 @@ struct RunRecord {
   int map_reconnections = 0;  ///< how often the map's server was lost and reached again
   /// The file with what the map's server has not got; empty = none.
   std::string map_queue = {};
-  std::int64_t map_queued_frames = 0;  ///< at the end
-  std::int64_t map_unverified = 0;     ///< see MapWriter::unverified()
+  std::int64_t map_queued_frames = 0;           ///< at the end
+  std::int64_t map_unverified = 0;              ///< see MapWriter::unverified()
+  std::vector<std::string> map_not_asked = {};  ///< see MapWriter::not_asked()
   /// "running", "end", "interrupt", or an error message. A killed run keeps "running".
   std::string stopped_by = "end";
   double wall_s = 0;  ///< reading and detecting
