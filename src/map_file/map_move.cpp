@@ -23,7 +23,7 @@ namespace loopbit {
 namespace {
 
 /// A row of a session: the number of its table, what tells it from others there, and its checksum.
-using Row = std::array<std::int64_t, 5>;
+using SessionRow = std::array<std::int64_t, 5>;
 
 constexpr const char* kRows =
     "SELECT 0, frames, 0, 0, checksum FROM session WHERE session = ?1 "
@@ -37,15 +37,15 @@ constexpr const char* kRows =
     "session = ?1";
 
 /// Sorted. A checksum covers its row, so that equal lists are equal sessions.
-std::vector<Row> rows_of(const MapDatabase& map, int session) {
+std::vector<SessionRow> rows_of(const MapDatabase& map, int session) {
   const auto found = map.prepare(kRows);
   const KeyRange places = places_of(map, session);
   found->bind(1, std::int64_t{session});
   found->bind(2, places.first);
   found->bind(3, places.last);
-  std::vector<Row> rows;
+  std::vector<SessionRow> rows;
   while (found->step()) {
-    Row& row = rows.emplace_back();
+    SessionRow& row = rows.emplace_back();
     for (std::size_t i = 0; i < row.size(); ++i) row.at(i) = found->integer(static_cast<int>(i));
   }
   std::ranges::sort(rows);
@@ -53,7 +53,7 @@ std::vector<Row> rows_of(const MapDatabase& map, int session) {
 }
 
 /// Reads every byte of a session, and writes it to `to` unless that is null.
-void read_rows(const MapDatabase& from, int session, RowWriter* to, Damage& damage) {
+void read_session_rows(const MapDatabase& from, int session, RowWriter* to, Damage& damage) {
   FeatureReader features(from);
   ImageReader images(from);
   for_each_place(
@@ -122,7 +122,7 @@ class SessionMove {
       return;
     }
     check(*moved, there);
-    const std::vector<Row> rows = rows_of(*source_, session);
+    const std::vector<SessionRow> rows = rows_of(*source_, session);
     if (rows_of(*target_, session) != rows || !damage_there(session).clauses().empty()) {
       copy(*moved, there);
       refuse_damaged(target_->path(), damage_there(session).clauses());
@@ -130,7 +130,7 @@ class SessionMove {
     }
     remove(*moved, rows);
     ++counts.sessions;
-    counts.places += std::ranges::count(rows, 1, [](const Row& row) { return row.front(); });
+    counts.places += std::ranges::count(rows, 1, [](const SessionRow& row) { return row.front(); });
   }
 
  private:
@@ -204,7 +204,7 @@ class SessionMove {
 
   [[nodiscard]] Damage damage_there(int session) const {
     Damage damage;
-    read_rows(*target_, session, nullptr, damage);
+    read_session_rows(*target_, session, nullptr, damage);
     return damage;
   }
 
@@ -222,7 +222,7 @@ class SessionMove {
     if (moved.linked) writer.write_linked(moved.session);
     {
       const auto snapshot = reader_->snapshot();
-      read_rows(*reader_, moved.session, &writer, damage);
+      read_session_rows(*reader_, moved.session, &writer, damage);
     }
     refuse_damaged(source_->path(), damage.clauses());
     const auto owner = source_->prepare("SELECT owner FROM session WHERE uid = ?1");
@@ -234,7 +234,7 @@ class SessionMove {
   }
 
   /// If it has not changed: `rows` are what the other map has.
-  void remove(const MapSession& moved, const std::vector<Row>& rows) const {
+  void remove(const MapSession& moved, const std::vector<SessionRow>& rows) const {
     const auto transaction = source_->begin();
     source_->hold_back_commits();
     if (rows_of(*source_, moved.session) != rows) throw changed(moved.session);
