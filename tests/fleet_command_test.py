@@ -202,7 +202,7 @@ class FleetTest(CommandTest):
               self.server.address("empty", "stranger"))
         fails(4, ["permission denied", "loopbit_writer"], *run, self.server.address("town", "viewer"))
         fails(2, ["not a valid address", "%40"], *run, "postgresql://robot1:sec@ret:secret@h/town")
-        fails(2, ["is on a server", "map merge"], "map", "compact", self.town, "--budget", "5")
+        fails(4, ["only its owner"], "map", "compact", self.robot, "--budget", "5")
         fails(2, ["is on a server", "NEW.db"], "map", "check", self.file, "--recover", self.town)
         fails(2, ["not the address of a server"], "map", "create", "town.db")
         ran = loopbit("map", "info", dead, dead)

@@ -389,6 +389,41 @@ TEST_F(FleetMap, WhatTheServerDoesNotTakeIsMergedLater) {
   }
 }
 
+TEST_F(FleetMap, IsCompactedAsAFile) {
+  const std::string file = path("town.db");
+  for (const std::string& map : {file, address}) {
+    add_session(map, 40, "first", std::nullopt, encode_image);
+    add_session(map, 30, "second", SessionFrame{1, 5}, encode_image);
+    add_session(map, 20, "third", SessionFrame{2, 3}, encode_image);
+  }
+  const auto expect_same = [&](const CompactOptions& options) {
+    const CompactCounts of_file = compact_map(file, options);
+    const CompactCounts of_server = compact_map(address, options);
+    EXPECT_EQ(of_server.places_before, of_file.places_before);
+    EXPECT_EQ(of_server.places_after, of_file.places_after);
+    MapReader one(file);
+    MapReader other(address);
+    const auto expected = places_of(one);
+    const auto places = places_of(other);
+    ASSERT_EQ(places.size(), expected.size());
+    for (std::size_t i = 0; i < places.size(); ++i) EXPECT_EQ(places[i].at, expected[i].at);
+    EXPECT_EQ(other.sessions().size(), one.sessions().size());
+    EXPECT_EQ(other.loops(), one.loops());
+    EXPECT_EQ(other.images().number, one.images().number);
+    EXPECT_EQ(check_map(address).damage, std::vector<std::string>{});
+    expect_only_true_places(other);
+  };
+  expect_same({.drop_sessions = {2, 2}});
+  expect_same({.drop_sessions = {}, .max_places = 25});
+  expect_same({.drop_sessions = {}, .drop_images = true});
+  EXPECT_EQ(sql("SELECT count(*) FROM loopbit.features"), "25");
+  expect_error(ErrorKind::option, {"session 9"},
+               [&] { compact_map(address, {.drop_sessions = {9}}); });
+  MapWriter robot(address, fast_options(), "robot");
+  expect_error(ErrorKind::output, {"being written"},
+               [&] { compact_map(address, {.drop_sessions = {1}}); });
+}
+
 TEST_F(FleetMap, RemovesAndRejects) {
   add_session(address, 5, "first", SessionFrame{1, 0});
   MapWriter map(address, fast_options(), "second");

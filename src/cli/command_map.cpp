@@ -275,6 +275,9 @@ void compact_command(const std::string& path, const CompactOptions& options) {
   fmt::print("size       {:.1f} MB, before {:.1f} MB\n",
              static_cast<double>(counts.bytes_after) / 1e6,
              static_cast<double>(counts.bytes_before) / 1e6);
+  if (is_map_address(path)) {
+    fmt::print("freed      for new places; VACUUM FULL returns it to the server's disk\n");
+  }
 }
 
 struct MapFlags {

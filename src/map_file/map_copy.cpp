@@ -33,6 +33,7 @@
 #include "map_options.hpp"
 #include "map_rows.hpp"
 #include "map_schema.hpp"
+#include "server_tools.hpp"
 #include "thinning.hpp"
 
 namespace loopbit {
@@ -439,20 +440,6 @@ MapCheck recover_to_new(const std::string& from, const std::string& to) {
 
 // Compacting.
 
-std::vector<MapSession> sessions_but(const MapReader& map, const std::vector<int>& dropped) {
-  std::vector<MapSession> sessions = map.sessions();
-  for (const int number : std::set<int>(dropped.begin(), dropped.end())) {
-    const auto removed = std::erase_if(
-        sessions, [&](const MapSession& session) { return session.session == number; });
-    if (removed == 0) {
-      throw Error(ErrorKind::option, fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' "
-                                                 "shows those there are.",
-                                                 map.path(), number));
-    }
-  }
-  return sessions;
-}
-
 /// Keys are never reused, not even those of the rows dropped last.
 void keep_sequences(const Database& from, const Database& to) {
   for (const char* table : {"session", "place"}) {
@@ -565,12 +552,7 @@ MapCheck recover_map(const std::string& from, const std::string& to) {
 }
 
 CompactCounts compact_map(const std::string& path, const CompactOptions& options) {
-  if (is_map_address(path)) {
-    throw Error(ErrorKind::option,
-                fmt::format("'{0}' is on a server, but only map files are compacted; 'loopbit map "
-                            "merge NEW.db {0}' copies it to a file.",
-                            without_secrets(path)));
-  }
+  if (is_map_address(path)) return compact_on_server(path, options);
   (void)open_map_for_reading(path);  // it must exist
   const Database old = open_map_for_writing(path);
   const std::string file = resolved_path(path);

@@ -102,9 +102,11 @@ struct CompactCounts {
 };
 
 /// Drops sessions, redundant places and images, and frees their space. The new file replaces the
-/// old one in one step, so a crash leaves a complete map. It needs space for both files. Throws
-/// Error: kind option for a session that does not exist; output if others read or write the map, or
-/// it cannot be written; input if it is damaged.
+/// old one in one step, so a crash leaves a complete map. It needs space for both files. On a
+/// server, the rows are removed in one commit, and the server reuses their space; this needs the
+/// owner of the map, and robots that are running keep what they know. Throws Error: kind option for
+/// a session that does not exist; output if others write the map or read the file, or it cannot be
+/// written; input if it is damaged.
 CompactCounts compact_map(const std::string& path, const CompactOptions& options);
 
 enum class ExportFormat { csv, json, g2o };

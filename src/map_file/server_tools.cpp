@@ -1,10 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-// Moves sessions from one server to another. At any time, one of them at least has a session whole.
+// The tools that remove rows from maps on servers: moving sessions to another server, and
+// compacting.
+#include "server_tools.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,11 +17,11 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/map_server.hpp"
-#include "loopbit/map_tools.hpp"
 
 #include "file_database.hpp"
 #include "map_options.hpp"
 #include "map_rows.hpp"
+#include "thinning.hpp"
 
 namespace loopbit {
 namespace {
@@ -81,13 +85,19 @@ void read_session_rows(const MapDatabase& from, int session, RowWriter* to, Dama
   each(read_loop_poses(from, damage), query, [&](const MapLoopPose& pose) { to->write(pose); });
 }
 
-/// In the current transaction. Features and images go with their places.
+// In the current transaction. Features and images go with their places.
+
+void remove_rows(const MapDatabase& map, const char* table, const char* column, std::int64_t key) {
+  const auto rows = map.prepare(fmt::format("DELETE FROM {} WHERE {} = ?1", table, column));
+  rows->bind(1, key);
+  rows->run();
+}
+
+/// But for loops of other sessions that lead to it.
 void remove_session(const MapDatabase& map, int session) {
   for (const char* table :
        {"linked", "relative_pose", "odometry", "rejected", "loop", "place", "session"}) {
-    const auto row = map.prepare(fmt::format("DELETE FROM {} WHERE session = ?1", table));
-    row->bind(1, std::int64_t{session});
-    row->run();
+    remove_rows(map, table, "session", session);
   }
 }
 
@@ -96,7 +106,7 @@ void check_owns(const MapDatabase& map) {
   const auto hides = map.prepare("SELECT row_security_active('session')");
   if (hides->step() && hides->integer(0) == 0) return;
   throw Error(ErrorKind::output,
-              fmt::format("'{}' lets only its owner move sessions, the role that made the map by "
+              fmt::format("'{}' lets only its owner remove rows, the role that made the map by "
                           "'loopbit map create'; name that role in the address.",
                           map.path()));
 }
@@ -260,7 +270,68 @@ class SessionMove {
   std::unique_ptr<MapDatabase> target_;
 };
 
+/// Those that are not among `kept`, but whose sessions are.
+std::vector<std::int64_t> thinned_places(MapReader& map, const CompactOptions& options,
+                                         const std::set<std::int64_t>& kept,
+                                         CompactCounts& counts) {
+  std::vector<std::int64_t> thinned;
+  map.for_each_place([&](const MapPlace& place) {
+    ++counts.places_before;
+    if (kept.contains(place.id) ||
+        std::ranges::count(options.drop_sessions, place.at.session) > 0) {
+      return;
+    }
+    thinned.push_back(place.id);
+  });
+  refuse_damaged(map.path(), map.damage());
+  return thinned;
+}
+
 }  // namespace
+
+std::vector<MapSession> sessions_but(const MapReader& map, const std::vector<int>& dropped) {
+  std::vector<MapSession> sessions = map.sessions();
+  for (const int number : std::set<int>(dropped.begin(), dropped.end())) {
+    const auto removed = std::erase_if(
+        sessions, [&](const MapSession& session) { return session.session == number; });
+    if (removed == 0) {
+      throw Error(ErrorKind::option, fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' "
+                                                 "shows those there are.",
+                                                 map.path(), number));
+    }
+  }
+  return sessions;
+}
+
+/// Robots may begin sessions meanwhile, whose places are kept.
+CompactCounts compact_on_server(const std::string& address, const CompactOptions& options) {
+  const auto database = open_map(address, MapDatabase::Access::link);
+  check_owns(*database);
+  MapReader map(address);
+  (void)sessions_but(map, options.drop_sessions);
+  CompactCounts counts{.bytes_before = static_cast<std::uintmax_t>(database->bytes())};
+  const std::set<std::int64_t> kept = remaining_places(map, options);
+  const std::vector<std::int64_t> thinned = thinned_places(map, options, kept, counts);
+  counts.places_after = static_cast<std::int64_t>(kept.size());
+
+  const auto transaction = database->begin();
+  for (const int session : options.drop_sessions) {
+    for (const char* table : {"relative_pose", "rejected", "loop"}) {
+      remove_rows(*database, table, "match_session", session);
+    }
+    remove_session(*database, session);
+  }
+  const auto row = database->prepare("DELETE FROM place WHERE place = ?1");
+  for (const std::int64_t place : thinned) {
+    row->bind(1, place);
+    row->run();
+  }
+  if (options.drop_images) database->prepare("DELETE FROM image")->run();
+  transaction->end();
+  (void)database->prepare("VACUUM place, features, image, loop, rejected, relative_pose")->step();
+  counts.bytes_after = static_cast<std::uintmax_t>(database->bytes());
+  return counts;
+}
 
 MoveCounts move_sessions(const std::string& from, const std::string& to,
                          const std::vector<int>& sessions) {
