@@ -245,6 +245,35 @@ void bind_reader(py::module_& module) {
       });
 }
 
+void bind_shards(py::module_& module) {
+  py::class_<SharedShards, SharedMap, std::shared_ptr<SharedShards>>(
+      module, "ShardedMap",
+      "Reads a map whose sessions are distributed over several servers. A detector of it gives the "
+      "answers of one map with all sessions; it only queries. A server that does not answer is "
+      "left "
+      "out from then on.")
+      .def(py::init<const std::vector<std::string>&, std::size_t>(), py::arg("addresses"),
+           py::arg("cache_mb") = kMapCache_mb, Free(),
+           "Raises the error of the first server if none can be asked, and OptionError if two have "
+           "different sessions of the same number. cache_mb limits the features kept in memory, in "
+           "MiB.")
+      .def_property_readonly(
+          "options", py::cpp_function(&call<&ShardedMap::options, SharedShards>, Free()),
+          "The defaults with the settings of the map's places. Raises InputError if no session has "
+          "them.")
+      .def_property_readonly("damage",
+                             py::cpp_function(&call<&ShardedMap::damage, SharedShards>, Free()),
+                             "The damage found so far, one clause each.")
+      .def_property_readonly("not_asked",
+                             py::cpp_function(&call<&ShardedMap::not_asked, SharedShards>, Free()),
+                             "The addresses of the servers that are left out, without passwords.")
+      .def("take_notices", &call<&ShardedMap::take_notices, SharedShards>, Free(),
+           "Why they are, one sentence each, since the last call.")
+      .def("__repr__", [](const SharedShards& self) {
+        return fmt::format("ShardedMap({})", literal(py::cast(Text{self.path()})));
+      });
+}
+
 void bind_writer(py::module_& module) {
   py::class_<SharedWriter, SharedMap, std::shared_ptr<SharedWriter>>(
       module, "MapWriter",
@@ -266,7 +295,8 @@ void bind_writer(py::module_& module) {
           "cannot be written, and OptionError if it was made with other settings of "
           "binary_content or surf. path may be the address of a map on a server, "
           "'postgresql://...', whose frames are queued in the map file queue first, by default "
-          "'town_session_2_queue.db' in the working folder.")
+          "'town_session_2_queue.db' in the working folder. Of several addresses, separated by "
+          "spaces, the first one gets the session.")
       .def_property_readonly("session",
                              py::cpp_function(&call<&MapWriter::session, SharedWriter>, Free()),
                              "Number of the session that is being written.")
@@ -326,9 +356,10 @@ void bind_map(py::module_& module) {
   bind_session_frame(module);
   bind_session(module);
   py::class_<SharedMap, std::shared_ptr<SharedMap>>(
-      module, "MapStorage", "Base of MapReader and MapWriter, for LoopDetector.")
+      module, "MapStorage", "Base of MapReader, MapWriter and ShardedMap, for LoopDetector.")
       .def_property_readonly("path", [](const SharedMap& self) { return Text{self.path()}; });
   bind_reader(module);
+  bind_shards(module);
   bind_writer(module);
 }
 

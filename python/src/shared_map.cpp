@@ -9,6 +9,27 @@ void SharedMap::check_options(const LoopDetectorOptions& options) {
   storage().check_options(options);
 }
 
+PlaceSearch* SharedMap::place_search() {
+  const auto guard = lock();
+  return storage().place_search() ? this : nullptr;
+}
+
+void SharedMap::for_each_place(double unmoved, const PlaceSearch::Visit& visit) {
+  const auto guard = lock();
+  storage().place_search()->for_each_place(unmoved, visit);
+}
+
+SharedMap::Similar SharedMap::most_similar(const BinaryContent& content,
+                                           int shift_tolerance_columns, std::size_t number) {
+  const auto guard = lock();
+  return storage().place_search()->most_similar(content, shift_tolerance_columns, number);
+}
+
+BinaryContent SharedMap::content(PlaceId place) {
+  const auto guard = lock();
+  return storage().place_search()->content(place);
+}
+
 void SharedMap::for_each_earlier_place(const Visit& visit) {
   const auto guard = lock();
   storage().for_each_earlier_place(visit);
@@ -54,6 +75,11 @@ std::optional<LoopDetectorOptions> SharedReader::options() const {
   const auto guard = lock();
   if (reader_.sessions().empty()) return std::nullopt;
   return reader_.options();
+}
+
+std::optional<LoopDetectorOptions> SharedShards::options() const {
+  const auto guard = lock();
+  return shards_.options();
 }
 
 }  // namespace loopbit::python

@@ -10,17 +10,24 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "loopbit/map_file.hpp"
 #include "loopbit/map_server.hpp"
 #include "loopbit/picture_jpeg.hpp"
+#include "loopbit/sharded_map.hpp"
 
 namespace loopbit::python {
 
 /// A map that several Python threads and one detector may share. It serves one at a time. Call all
 /// functions but the constructor and path() without the GIL; see SharedDetector.
-class SharedMap : public MapStorage {
+class SharedMap : public MapStorage, private PlaceSearch {
  public:
+  using Visit = MapStorage::Visit;
+
   /// `path`: without secrets.
   explicit SharedMap(std::string path) : path_(std::move(path)) {}
 
@@ -30,6 +37,7 @@ class SharedMap : public MapStorage {
   [[nodiscard]] virtual std::optional<LoopDetectorOptions> options() const = 0;
 
   void check_options(const LoopDetectorOptions& options) final;
+  PlaceSearch* place_search() final;
   void for_each_earlier_place(const Visit& visit) final;
   void for_each_earlier_loop(const VisitLoop& visit) final;
   std::int64_t epoch() final;
@@ -47,6 +55,11 @@ class SharedMap : public MapStorage {
   }
 
  private:
+  void for_each_place(double unmoved, const PlaceSearch::Visit& visit) final;
+  Similar most_similar(const BinaryContent& content, int shift_tolerance_columns,
+                       std::size_t number) final;
+  BinaryContent content(PlaceId place) final;
+
   virtual void check_process() const {}
   [[nodiscard]] virtual MapStorage& storage() = 0;
 
@@ -72,6 +85,27 @@ class SharedReader : public SharedMap {
   [[nodiscard]] MapStorage& storage() override { return reader_; }
 
   MapReader reader_;
+};
+
+class SharedShards : public SharedMap {
+ public:
+  SharedShards(const std::vector<std::string>& addresses, std::size_t cache_mb)
+      : SharedMap(without_secrets(fmt::format("{}", fmt::join(addresses, " ")))),
+        shards_(addresses, cache_mb) {}
+
+  [[nodiscard]] std::optional<LoopDetectorOptions> options() const override;
+
+  /// As SharedReader's.
+  template <typename Use>
+  auto exclusively(Use&& use) {
+    const auto guard = lock();
+    return use(shards_);
+  }
+
+ private:
+  [[nodiscard]] MapStorage& storage() override { return shards_; }
+
+  ShardedMap shards_;
 };
 
 class SharedWriter : public SharedMap {

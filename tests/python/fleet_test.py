@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: MIT
 """Maps on a PostgreSQL server, which this starts: they answer as map files do."""
 
+import os
 import pathlib
 import sys
 
@@ -14,6 +15,7 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "scripts"))
 from postgres_server import ENCODED_PASSWORD, PASSWORD, PostgresServer    # noqa: E402
 
 LAP = 60
+SEARCH = os.environ.get("LOOPBIT_SERVER_SEARCH")    # the folder of the server's extension, if it was built
 
 
 def record(path, images, name, **settings):
@@ -26,7 +28,7 @@ def record(path, images, name, **settings):
 @pytest.fixture(scope="module")
 def server():
     try:
-        server = PostgresServer()
+        server = PostgresServer(extension=SEARCH and pathlib.Path(SEARCH))
     except SystemExit as reason:
         pytest.skip(str(reason))
     with server:
@@ -70,12 +72,21 @@ def test_an_answer_is_as_of_an_epoch(maps, images):
     reader = loopbit.MapReader(address)
     reader.set_epoch(epoch)
     before = loopbit.LoopDetector(map=reader).query(images[LAP + 5])
-    now = loopbit.LoopDetector(map=loopbit.MapReader(address)).query(images[LAP + 5])
+    latest = loopbit.MapReader(address)
+    latest.set_epoch(epoch + 1)
+    now = loopbit.LoopDetector(map=latest).query(images[LAP + 5])
     assert now.epoch > before.epoch == epoch > 0
     assert before.earlier_match.session == 1
     assert now.earlier_match == loopbit.SessionFrame(2, 5)
     with pytest.raises(loopbit.OptionError, match="epoch"):
         loopbit.MapReader(file).set_epoch(1)
+
+
+@pytest.mark.skipif(not SEARCH, reason="the extension was not built")
+def test_a_detector_searches_on_the_server(maps, images):
+    found, of_file = (loopbit.LoopDetector(map=loopbit.MapReader(path)).query(images[LAP + 5]) for path in maps[:2])
+    assert found.epoch == 0    # it has read no contents
+    assert as_row(found) == as_row(of_file)
 
 
 def test_a_run_uses_a_map_on_a_server(maps, dataset, server, command, tmp_path):
@@ -86,7 +97,7 @@ def test_a_run_uses_a_map_on_a_server(maps, dataset, server, command, tmp_path):
     assert [session.frames for session in loopbit.MapReader(address).sessions] == [2 * LAP]
 
 
-def test_sessions_move_to_another_server(maps, server, command):
+def test_sessions_move_to_another_server(maps, images, server, command):
     _, file, _ = maps
     ends = []
     for name in ("here", "there"):
@@ -100,6 +111,17 @@ def test_sessions_move_to_another_server(maps, server, command):
     assert loopbit.move_sessions(*ends, [2]).known == 1
     with pytest.raises(loopbit.OptionError, match="no session 9"):
         loopbit.move_sessions(*ends, [9])
+    several = loopbit.ShardedMap(ends)
+    of_several = loopbit.LoopDetector(map=several).query(images[5])
+    assert as_row(of_several) == as_row(loopbit.LoopDetector(map=loopbit.MapReader(file)).query(images[5]))
+    assert of_several.earlier_match
+    away = loopbit.ShardedMap([*ends, ends[0].replace("/here", "/away")])
+    assert len(away.not_asked) == len(away.take_notices()) == 1
+    assert ENCODED_PASSWORD not in repr(away)
+    with loopbit.MapWriter(" ".join(ends), loopbit.LoopDetectorOptions(), "third lap",
+                           queue=file.with_name("third.db")) as map:
+        assert loopbit.LoopDetector(map=map).process(images[LAP]).earlier_match
+        assert map.not_asked == []
 
 
 def test_a_password_is_not_shown(maps):
