@@ -45,28 +45,33 @@ def poses_of(file):
 
 
 class Town:
-    """A map with one session, of which each run gets a copy, and what a run says that nothing disturbs."""
+    """A map with one session, of which each run gets a copy, and what a run says that nothing disturbs. Every
+    other run has the session on a second server, which it only reads."""
 
-    def __init__(self, server, loopbit, first, images, laps, poses, folder):
+    def __init__(self, server, second, loopbit, first, images, laps, poses, folder):
         """`first`: a map file with the session. `images`: of the next one, again and again. `poses`: of both."""
-        self.server, self.loopbit, self.folder = server, loopbit, folder
-        server.sql("postgres", "CREATE DATABASE faultless")
-        loopbit("map", "create", server.address("faultless"))
-        loopbit("map", "merge", server.address("faultless"), first)
+        self.server, self.second, self.loopbit, self.folder = server, second, loopbit, folder
+        for each, name in (server, "faultless"), (server, "empty"), (second, "first"):
+            each.sql("postgres", f"CREATE DATABASE {name}")
+            loopbit("map", "create", each.address(name), "--first-session", 2 if name == "empty" else 1)
+            if name != "empty":
+                loopbit("map", "merge", each.address(name), first)
         self.images = folder / "drive.txt"
         self.poses = list(poses_of(poses))
         self.lap = len(list(images.iterdir()))
         self.images.write_text("".join(f"{image.resolve()}\n" for image in laps * sorted(images.iterdir())))
         undisturbed = folder / "undisturbed"
-        with self.run("undisturbed", undisturbed) as run:
+        with self.run("undisturbed", undisturbed, False) as run:
             if run.wait():
                 raise SystemExit("The undisturbed run failed.")
         self.loops = loops_of(undisturbed)
 
-    def run(self, name, out):
-        self.server.sql("postgres", f"CREATE DATABASE {name} TEMPLATE faultless STRATEGY FILE_COPY")
-        return subprocess.Popen([self.loopbit.program, "run", self.images, "--map", self.server.address(name), "--out",
-                                 out, "--no-report", "--quiet"], stderr=subprocess.DEVNULL)
+    def run(self, name, out, on_two):
+        template = "empty" if on_two else "faultless"
+        self.server.sql("postgres", f"CREATE DATABASE {name} TEMPLATE {template} STRATEGY FILE_COPY")
+        addresses = [self.server.address(name)] + on_two * [self.second.address("first")]
+        return subprocess.Popen([self.loopbit.program, "run", self.images, "--map", " ".join(addresses), "--out", out,
+                                 "--no-report", "--quiet"], stderr=subprocess.DEVNULL)
 
     def pose(self, place):
         """Of a place as loops.csv names it."""
@@ -80,6 +85,11 @@ class Town:
         turn = abs(math.remainder(heading - match_heading, 2 * math.pi))
         return math.hypot(x - match_x, z - match_z) > NEAR_M or turn > math.radians(NEAR_DEG)
 
+    def places(self, name):
+        """Of both servers, as loops.csv names them."""
+        query = "SELECT CASE session WHEN 1 THEN '1:' ELSE '' END || frame FROM loopbit.place"
+        return set(self.server.sql(name, query).split() + self.second.sql("first", query).split())
+
     def saved_frames(self, name):
         return int(self.server.sql(name, "SELECT coalesce(max(frames), 0) FROM loopbit.session WHERE session = 2"))
 
@@ -92,13 +102,12 @@ class Faults:
         self.random = random.Random(SEED)
         self.kinds = ["kill"] * kills + ["cut"] * cuts
         self.random.shuffle(self.kinds)
-        self.found = {"kills": kills, "cuts": cuts, "fault_runs": 0, "fault_frames": 0, "merged_later": 0,
-                      "kill_lost": 0, "wrong_answers": 0, "other_matches": 0, "missed_loops": 0}
+        self.found = {"kills": kills, "cuts": cuts, "second_server": 0, "fault_runs": 0, "fault_frames": 0,
+                      "merged_later": 0, "kill_lost": 0, "wrong_answers": 0, "other_matches": 0, "missed_loops": 0}
         self.recovery_s = []
 
-    def disturb(self, kind):
+    def disturb(self, kind, server):
         """Returns when the server was there again."""
-        server = self.town.server
         if kind == "kill":
             server.kill()
             time.sleep(self.random.uniform(0, MAX_DEAD_S))
@@ -123,16 +132,19 @@ class Faults:
         """Disturbs one run until it ends, and looks at what is left of it."""
         name = f"faults{self.found['fault_runs']}"
         out = self.town.folder / name
-        with self.town.run(name, out) as run:
+        on_two = self.found["fault_runs"] % 2 == 1
+        with self.town.run(name, out, on_two) as run:
             goes_on = self.wait_for_frames(name, 0, run)
             while goes_on and self.kinds:
                 time.sleep(self.random.uniform(0, MAX_PAUSE_S))
                 if run.poll() is not None:
                     break
                 before = self.town.saved_frames(name)
-                again = self.disturb(self.kinds.pop())
+                is_first = not on_two or self.random.random() < 0.5
+                again = self.disturb(self.kinds.pop(), self.town.server if is_first else self.town.second)
                 goes_on = self.wait_for_frames(name, before, run)
-                if goes_on:
+                self.found["second_server"] += not is_first
+                if goes_on and is_first:
                     self.recovery_s.append(time.monotonic() - again)
             if run.wait():
                 raise SystemExit(f"A run failed: see {out}.")
@@ -151,17 +163,12 @@ class Faults:
         found["fault_frames"] += len(given)
         found["kill_lost"] += len(given - saved)
         loops = loops_of(out)
-        found["wrong_answers"] += sum(town.is_wrong(*loop) for loop in loops.items()) + self.nowhere(name)
+        places = town.places(name)
+        found["wrong_answers"] += sum(match not in places or town.is_wrong(frame, match)
+                                      for frame, match in loops.items())
         found["other_matches"] += sum(town.loops.get(frame) != match for frame, match in loops.items())
         found["missed_loops"] += len(town.loops.keys() - loops.keys())
         town.server.sql("postgres", f"DROP DATABASE {name}")
-
-    def nowhere(self, name):
-        """The loops that name a place that the map does not have."""
-        place = "SELECT FROM loopbit.place WHERE (place.session, place.frame) ="
-        return int(self.town.server.sql(
-            name, f"SELECT count(*) FROM loopbit.loop WHERE NOT EXISTS ({place} (loop.session, loop.frame)) OR "
-            f"NOT EXISTS ({place} (match_session, match_frame))"))
 
 
 def measure(town, kills, cuts):
