@@ -250,6 +250,25 @@ TEST(LoopGraphTest, DerivativesAreRight) {
   }
 }
 
+TEST(LoopGraphTest, FactorsAreThoseOfTheMatrix) {
+  for (const int rank : {3, 5, 6}) {
+    for (int round = 0; round < 100; ++round) {
+      graph::Matrix6d root = graph::Matrix6d::Random();
+      for (int k = rank; k < 6; ++k) root.col(k).setZero();
+      const graph::Matrix6d matrix = root * root.transpose();
+      const graph::Factors factors(matrix);
+      const graph::Matrix6d again = factors.square_root();
+      EXPECT_LE((again.transpose() * again - matrix).norm(), rank < 6 ? 1e-7 : 1e-12) << rank;
+      if (rank < 6) continue;
+      EXPECT_TRUE(factors.are_positive());
+      const graph::Matrix6d inverse = matrix.inverse();
+      EXPECT_LE((factors.inverse() - inverse).norm(), 1e-9 * inverse.squaredNorm());
+      const graph::Vector6d v = root.col(0);
+      EXPECT_NEAR(factors.mahalanobis_sq(v), v.dot(inverse * v), 1e-9 * inverse.norm());
+    }
+  }
+}
+
 #ifndef LOOPBIT_SANITIZED
 TEST(LoopGraphTest, CostIsThatOfAPlainPoseGraph) {
   SyntheticGraph synthetic =

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/g2o_file.hpp"
 
-#include <Eigen/Cholesky>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -229,7 +228,7 @@ class G2oFile {
   void check(const Edge& edge) const {
     const bool exist = std::max(edge.from, edge.to) < static_cast<int>(poses_.size());
     const bool is_whole =
-        edge.known != PoseKnown::metric || edge.information.llt().info() == Eigen::Success;
+        edge.known != PoseKnown::metric || graph::Factors(edge.information).are_positive();
     if (exist && is_whole) return;
     throw Error(ErrorKind::input,
                 fmt::format("'{}': the edge from {} to {} {}", path_, edge.from, edge.to,
@@ -239,7 +238,9 @@ class G2oFile {
 
   /// Of what is known.
   static cv::Matx66d covariance_of(const Edge& edge) {
-    return graph::cv_of(edge.information.completeOrthogonalDecomposition().pseudoInverse());
+    cv::Matx66d covariance;
+    cv::invert(graph::cv_of(edge.information), covariance, cv::DECOMP_SVD);
+    return covariance;
   }
 
   std::string path_;

@@ -12,10 +12,9 @@
 
 #include "loopbit/loop_graph.hpp"
 
-namespace loopbit::graph {
+#include "symmetric_matrix.hpp"
 
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
-using Vector6d = Eigen::Matrix<double, 6, 1>;
+namespace loopbit::graph {
 
 /// Position and quaternion (x, y, z, w), as Ceres varies them.
 using Pose = std::array<double, 7>;

@@ -58,7 +58,8 @@ int GraphImpl::add_keyframe(const std::optional<Edge>& odometry) {
     keyframe.chain = before.chain;
     keyframe.reckoned = graph::times(before.reckoned, odometry->measured);
     const graph::Matrix6d carry = graph::adjoint(keyframe.reckoned);
-    keyframe.drift = before.drift + carry * odometry->information.inverse() * carry.transpose();
+    keyframe.drift =
+        before.drift + graph::carried(carry, graph::Factors(odometry->information).inverse());
     pose = graph::times(poses_.back(), odometry->measured);
   }
   keyframes_.push_back(keyframe);
@@ -164,7 +165,7 @@ void GraphImpl::start_from_relaxation() {
   for (const Keyframe& keyframe : keyframes_) {
     if (!keyframe.odometry) continue;
     const Edge& edge = *keyframe.odometry;
-    add(edge.from, edge.to, edge.measured, edge.information.inverse(), 1);
+    add(edge.from, edge.to, edge.measured, graph::Factors(edge.information).inverse(), 1);
   }
   for (const std::size_t i : of_verdict(LoopVerdict::kept)) {
     const graph::WideLoop& loop = wide_[i];

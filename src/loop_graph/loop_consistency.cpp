@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loop_consistency.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cstddef>
 #include <limits>
@@ -31,8 +30,7 @@ Vector6d small_motion(const Pose& error) {
 }
 
 double mahalanobis(const Pose& error, const Matrix6d& covariance) {
-  const Vector6d motion = small_motion(error);
-  return motion.dot(covariance.ldlt().solve(motion));
+  return Factors(covariance).mahalanobis_sq(small_motion(error));
 }
 
 double position_variance(const Matrix6d& covariance) {
@@ -95,7 +93,7 @@ WideLoop wide_loop(const Edge& loop, double seen_within_m) {
   constexpr double kAnyRotation = 1.0;  // rad; the same features are not seen from behind
   WideLoop wide{loop.from, loop.to, loop.measured, Matrix6d::Zero()};
   if (loop.known == PoseKnown::metric) {
-    wide.covariance = loop.information.inverse();
+    wide.covariance = Factors(loop.information).inverse();
     return wide;
   }
   wide.T_match_query[0] = wide.T_match_query[1] = wide.T_match_query[2] = 0;
@@ -115,7 +113,7 @@ Reckoned reckon(const std::vector<Keyframe>& keyframes, int from, int to) {
   const Keyframe& b = at(keyframes, to);
   const Matrix6d carry = adjoint(inverse(b.reckoned));
   const Matrix6d drift = from < to ? b.drift - a.drift : a.drift - b.drift;
-  return {between(a.reckoned, b.reckoned), carry * drift * carry.transpose()};
+  return {between(a.reckoned, b.reckoned), carried(carry, drift)};
 }
 
 std::optional<double> odometry_chi2(const std::vector<Keyframe>& keyframes, const WideLoop& loop) {
@@ -141,10 +139,10 @@ Cycle cycle_of(const std::vector<Keyframe>& keyframes, const WideLoop& a, const 
   // carried to b's query.
   const Pose way = times(times(matches.T_from_to, a.T_match_query), queries.T_from_to);
   const Matrix6d from_query = adjoint(inverse(queries.T_from_to));
-  const Matrix6d from_match = from_query * adjoint(inverse(a.T_match_query));
-  const Matrix6d covariance = b.covariance + queries.covariance +
-                              from_query * a.covariance * from_query.transpose() +
-                              from_match * matches.covariance * from_match.transpose();
+  const Matrix6d from_match = adjoint(inverse(a.T_match_query));
+  const Matrix6d covariance =
+      b.covariance + queries.covariance +
+      carried(from_query, a.covariance + carried(from_match, matches.covariance));
   return {mahalanobis(times(inverse(b.T_match_query), way), covariance),
           position_variance(covariance)};
 }

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/loop_graph.hpp"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -98,13 +96,17 @@ using graph::Pose;
 
 /// The inverse of a covariance, as large as what is known. None if it has no inverse.
 std::optional<Matrix6d> information_of(const Matrix6d& covariance, int first) {
-  const Eigen::MatrixXd known = covariance.bottomRightCorner(6 - first, 6 - first);
-  const Eigen::LLT<Eigen::MatrixXd> factor(known);
-  if (!covariance.allFinite() || factor.info() != Eigen::Success) return std::nullopt;
-  Matrix6d information = Matrix6d::Zero();
-  const Eigen::MatrixXd inverse =
-      factor.solve(Eigen::MatrixXd::Identity(known.rows(), known.cols()));
-  information.bottomRightCorner(6 - first, 6 - first) = (inverse + inverse.transpose()) / 2;
+  if (!covariance.allFinite()) return std::nullopt;
+  Matrix6d known = covariance;
+  for (int i = 0; i < first; ++i) {
+    known.row(i).setZero();
+    known.col(i).setZero();
+    known(i, i) = 1;
+  }
+  const graph::Factors factors(known);
+  if (!factors.are_positive()) return std::nullopt;
+  Matrix6d information = factors.inverse();
+  for (int i = 0; i < first; ++i) information(i, i) = 0;
   return information;
 }
 
@@ -117,7 +119,7 @@ std::optional<Matrix6d> information_across(const Matrix6d& covariance,
   if (information) {
     Matrix6d across = Matrix6d::Identity();
     across.topLeftCorner<3, 3>() -= ahead * ahead.transpose();
-    *information = across * *information * across;
+    *information = graph::carried(across, *information);
   }
   return information;
 }
@@ -231,7 +233,8 @@ std::vector<int> LoopGraph::worlds() const { return impl_->worlds(); }
 std::optional<Motion> LoopGraph::odometry(int keyframe) const {
   const auto& edge = impl_->keyframes().at(static_cast<std::size_t>(keyframe)).odometry;
   if (!edge) return std::nullopt;
-  return Motion{graph::matrix_of(edge->measured), graph::cv_of(edge->information.inverse())};
+  return Motion{graph::matrix_of(edge->measured),
+                graph::cv_of(graph::Factors(edge->information).inverse())};
 }
 
 const std::vector<JudgedLoop>& LoopGraph::loops() const { return impl_->loops(); }

@@ -23,7 +23,7 @@ PathCovariance::PathCovariance(const std::vector<Pose>& poses, std::span<const W
     const std::size_t number = in_world_.size();
     steps_[static_cast<std::size_t>(motion.match)].push_back({motion.query, variance, number});
     steps_[static_cast<std::size_t>(motion.query)].push_back({motion.match, variance, number});
-    in_world_.emplace_back(carry * motion.covariance * carry.transpose());
+    in_world_.emplace_back(carried(carry, motion.covariance));
   }
 }
 
@@ -55,7 +55,7 @@ std::optional<Matrix6d> PathCovariance::between(int from, int to) const {
     sum += in_world_[reached[static_cast<std::size_t>(at)].motion];
   }
   const Matrix6d carry = adjoint(inverse(poses_[static_cast<std::size_t>(to)]));
-  return carry * sum * carry.transpose();
+  return carried(carry, sum);
 }
 
 }  // namespace loopbit::graph

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "pose_problem.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,13 +11,6 @@
 
 namespace loopbit::graph {
 namespace {
-
-/// S with S' S = information. Rows of what is not known are 0.
-Matrix6d square_root(const Matrix6d& information) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information);
-  return solver.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal() *
-         solver.eigenvectors().transpose();
-}
 
 using Matrix34 = Eigen::Matrix<double, 3, 4>;
 using Matrix37 = Eigen::Matrix<double, 3, 7>;
@@ -96,7 +88,7 @@ class EdgeCost final : public ceres::CostFunction {
       : is_metric_(edge.known == PoseKnown::metric),
         translation_(edge.measured.data()),
         back_(Eigen::Quaterniond(edge.measured.data() + 3).conjugate()),
-        root_(square_root(edge.information)),
+        root_(Factors(edge.information).square_root()),
         nearness_(1 / seen_within_m) {
     set_num_residuals(is_metric_ ? 6 : 9);
     mutable_parameter_block_sizes()->assign({7, 7});

@@ -2,39 +2,44 @@
 // SPDX-License-Identifier: MIT
 #include "relaxed_poses.hpp"
 
-#include <Eigen/SVD>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <cstddef>
+
+#include "loopbit/ray_geometry.hpp"
 
 namespace loopbit::graph {
 namespace {
 
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, 3>;
 
-/// Normal equations of differences x_to - M x_from = d, in blocks of `size` rows.
+/// Normal equations of differences x_to - M x_from = d, with a rotation M of `size` rows.
 class Differences {
  public:
   Differences(int count, int size)
       : size_(size), right_(Columns::Zero(Eigen::Index{count} * size, 3)) {}
 
-  void add(int from, int to, const Eigen::MatrixXd& m, const Eigen::MatrixXd& d, double weight) {
-    const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size_, size_);
-    put(to, to, weight * one);
-    put(from, from, weight * m.transpose() * m);
-    // The lower triangle is enough.
-    if (to > from) {
-      put(to, from, -weight * m);
-    } else {
-      put(from, to, -weight * m.transpose());
+  void add(int from, int to, const Eigen::Matrix3d& m, double weight) {
+    for (int i = 0; i < size_; ++i) {
+      put(to, i, to, i, weight);
+      put(from, i, from, i, weight);
+      for (int j = 0; j < size_; ++j) {
+        // The lower triangle is enough.
+        to > from ? put(to, i, from, j, -weight * m(i, j)) : put(from, j, to, i, -weight * m(i, j));
+      }
     }
-    right_.middleRows(Eigen::Index{to} * size_, size_) += weight * d;
-    right_.middleRows(Eigen::Index{from} * size_, size_) -= weight * m.transpose() * d;
   }
-  void fix(int block, const Eigen::MatrixXd& value) {
+  /// Moves row 0 of a block.
+  void add_right(int block, const Eigen::Vector3d& d) {
+    for (int i = 0; i < 3; ++i) right_(Eigen::Index{block} * size_, i) += d[i];
+  }
+  /// To the identity, or to 0 if a block is one row.
+  void fix(int block) {
     constexpr double kWeight = 1e9;
-    put(block, block, kWeight * Eigen::MatrixXd::Identity(size_, size_));
-    right_.middleRows(Eigen::Index{block} * size_, size_) += kWeight * value;
+    for (int i = 0; i < size_; ++i) {
+      put(block, i, block, i, kWeight);
+      if (size_ == 3) right_(Eigen::Index{block} * size_ + i, i) += kWeight;
+    }
   }
   [[nodiscard]] Columns solve() const {
     Eigen::SparseMatrix<double> left(right_.rows(), right_.rows());
@@ -43,24 +48,14 @@ class Differences {
   }
 
  private:
-  void put(int row, int column, const Eigen::MatrixXd& block) {
-    for (int i = 0; i < size_; ++i) {
-      for (int j = 0; j < size_; ++j) {
-        left_.emplace_back(row * size_ + i, column * size_ + j, block(i, j));
-      }
-    }
+  void put(int row_block, int row, int column_block, int column, double value) {
+    left_.emplace_back(row_block * size_ + row, column_block * size_ + column, value);
   }
 
   int size_;
   std::vector<Eigen::Triplet<double>> left_;
   Columns right_;
 };
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
-  return svd.matrixU() * Eigen::Vector3d(1, 1, sign).asDiagonal() * svd.matrixV().transpose();
-}
 
 }  // namespace
 
@@ -69,29 +64,38 @@ std::vector<Pose> relaxed_poses(int count, std::span<const WeighedMotion> motion
   // Transposed rotations, so that each column stands alone.
   Differences rotations(count, 3);
   for (const WeighedMotion& motion : motions) {
-    const Eigen::Matrix3d back =
-        Eigen::Quaterniond(motion.T_from_to.data() + 3).conjugate().toRotationMatrix();
-    rotations.add(motion.from, motion.to, back, Eigen::Matrix3d::Zero(), motion.rotation_weight);
+    const Eigen::Quaterniond rotation(motion.T_from_to.data() + 3);
+    rotations.add(motion.from, motion.to, rotation.conjugate().toRotationMatrix(),
+                  motion.rotation_weight);
   }
-  for (const int keyframe : fixed) rotations.fix(keyframe, Eigen::Matrix3d::Identity());
+  for (const int keyframe : fixed) rotations.fix(keyframe);
   const Columns columns = rotations.solve();
   std::vector<Pose> poses(static_cast<std::size_t>(count), kIdentity);
   for (int k = 0; k < count; ++k) {
-    const Eigen::Quaterniond q(
-        nearest_rotation(columns.middleRows<3>(Eigen::Index{3} * k).transpose()));
-    Eigen::Map<Eigen::Vector4d>(poses[static_cast<std::size_t>(k)].data() + 3) = q.coeffs();
+    cv::Matx33d sum;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) sum(i, j) = columns(Eigen::Index{3} * k + j, i);
+    }
+    const cv::Matx33d r = best_rotation(sum);
+    poses[static_cast<std::size_t>(k)] =
+        pose_of({r(0, 0), r(0, 1), r(0, 2), 0, r(1, 0), r(1, 1), r(1, 2), 0,  //
+                 r(2, 0), r(2, 1), r(2, 2), 0, 0, 0, 0, 1});
   }
   Differences positions(count, 1);
   for (const WeighedMotion& motion : motions) {
     const Eigen::Quaterniond from(poses[static_cast<std::size_t>(motion.from)].data() + 3);
     const Eigen::Vector3d moved = from * Eigen::Vector3d(motion.T_from_to.data());
-    positions.add(motion.from, motion.to, Eigen::MatrixXd::Identity(1, 1), moved.transpose(),
-                  motion.position_weight);
+    const double weight = motion.position_weight;
+    positions.add(motion.from, motion.to, Eigen::Matrix3d::Identity(), weight);
+    positions.add_right(motion.to, weight * moved);
+    positions.add_right(motion.from, -weight * moved);
   }
-  for (const int keyframe : fixed) positions.fix(keyframe, Eigen::RowVector3d::Zero());
+  for (const int keyframe : fixed) positions.fix(keyframe);
   const Columns solved = positions.solve();
   for (int k = 0; k < count; ++k) {
-    Eigen::Map<Eigen::Vector3d>(poses[static_cast<std::size_t>(k)].data()) = solved.row(k);
+    for (int i = 0; i < 3; ++i) {
+      poses[static_cast<std::size_t>(k)][static_cast<std::size_t>(i)] = solved(k, i);
+    }
   }
   // Exactly, not only within rounding.
   for (const int keyframe : fixed) poses[static_cast<std::size_t>(keyframe)] = kIdentity;

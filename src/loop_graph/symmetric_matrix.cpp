@@ -47,7 +47,7 @@ double Factors::mahalanobis_sq(const Vector6d& v) const {
   double sum = 0;
   for (int row = 0; row < 6; ++row) {
     for (int k = 0; k < row; ++k) solved[row] -= lower_(row, k) * solved[k];
-    sum += solved[row] * solved[row] / pivots_[row];
+    if (pivots_[row] > 0) sum += solved[row] * solved[row] / pivots_[row];
   }
   return sum;
 }

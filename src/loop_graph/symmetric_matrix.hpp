@@ -22,9 +22,9 @@ class Factors {
   [[nodiscard]] bool are_positive() const { return pivots_.minCoeff() > 0; }
   /// S with S' S = M. Rows of what M does not tell are 0.
   [[nodiscard]] Matrix6d square_root() const;
-  // Of matrices with positive factors:
+  /// If they are positive.
   [[nodiscard]] Matrix6d inverse() const;
-  /// v' M^-1 v
+  /// v' M^-1 v, without the rows whose factor is 0.
   [[nodiscard]] double mahalanobis_sq(const Vector6d& v) const;
 
  private:
