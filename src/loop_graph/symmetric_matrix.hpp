@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Cholesky>
 
-/// What pose graphs do with symmetric matrices, in plain loops: each expression of Eigen's on
+/// What pose graphs do with symmetric matrices, in one source: each of Eigen's expressions on
 /// matrices of six rows takes the compiler a second or more.
 namespace loopbit::graph {
 
@@ -14,22 +14,23 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 /// A covariance in another frame: carry * covariance * carry'.
 Matrix6d carried(const Matrix6d& carry, const Matrix6d& covariance);
 
-/// M = L D L', with ones on the diagonal of L and no exchange of rows.
+/// M = P' L D L' P of a matrix M without negative eigenvalues: a permutation, a triangle with ones
+/// on its diagonal, and a diagonal.
 class Factors {
  public:
   explicit Factors(const Matrix6d& matrix);
 
-  [[nodiscard]] bool are_positive() const { return pivots_.minCoeff() > 0; }
-  /// S with S' S = M. Rows of what M does not tell are 0.
+  /// All of D, so that M has an inverse.
+  [[nodiscard]] bool are_positive() const;
+  /// S with S' S = M.
   [[nodiscard]] Matrix6d square_root() const;
   /// If they are positive.
   [[nodiscard]] Matrix6d inverse() const;
-  /// v' M^-1 v, without the rows whose factor is 0.
+  /// v' M^-1 v
   [[nodiscard]] double mahalanobis_sq(const Vector6d& v) const;
 
  private:
-  Matrix6d lower_ = Matrix6d::Identity();
-  Vector6d pivots_ = Vector6d::Zero();
+  Eigen::LDLT<Matrix6d> factors_;
 };
 
 }  // namespace loopbit::graph
