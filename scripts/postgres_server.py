@@ -69,6 +69,15 @@ def state(process):
     return status.rsplit(")", 1)[1].split()[0]
 
 
+def send(process, number):
+    """Sends a signal. Returns whether the process is there: it may have ended meanwhile, or before and is only
+    now forgotten by its parent."""
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(process, number)
+        return True
+    return False
+
+
 class PostgresServer:
     """A running server, whose superuser is "admin". With `safe`, commits are on disk. `extension`: the folder
     of a build with loopbit.so and what belongs to it; the server has it then. `limit_s`: for a call of sql()."""
@@ -116,8 +125,7 @@ class PostgresServer:
         children = pathlib.Path(f"/proc/{postmaster}/task/{postmaster}/children").read_text().split()
         stopped = [postmaster]
         for process in map(int, children):
-            with contextlib.suppress(ProcessLookupError):    # it ended meanwhile
-                os.kill(process, signal.SIGSTOP)
+            if send(process, signal.SIGSTOP):
                 stopped.append(process)
         return stopped
 
@@ -129,13 +137,13 @@ class PostgresServer:
             yield
         finally:
             for process in processes:
-                os.kill(process, signal.SIGCONT)
+                send(process, signal.SIGCONT)
 
     def kill(self):
         """Ends all processes of the server at once."""
         processes = self.processes()
         for process in processes:
-            os.kill(process, signal.SIGKILL)
+            send(process, signal.SIGKILL)
         while any(state(process) != "Z" for process in processes):
             time.sleep(0.01)
         # Their zombies would be taken for a server that runs.
