@@ -353,7 +353,7 @@ class MapWriter::Impl {
     }
     const auto& [id, at] = stored().place(place);
     if (id == StoredFeatures::kNoRow) return std::make_shared<const Features>();
-    const std::shared_ptr<const Features> read = earlier_->features(id, at);
+    std::shared_ptr<const Features> read = earlier_->features(id, at);
     if (!read) {
       ++unverified_;
       return std::make_shared<const Features>();
