@@ -270,10 +270,14 @@ class SessionMove {
   std::unique_ptr<MapDatabase> target_;
 };
 
-/// Those that are not among `kept`, but whose sessions are.
-std::vector<std::int64_t> thinned_places(MapReader& map, const CompactOptions& options,
-                                         const std::set<std::int64_t>& kept,
+/// The places that are dropped, but not with their session. What is added later is not among them.
+std::vector<std::int64_t> thinned_places(const std::string& address, const CompactOptions& options,
                                          CompactCounts& counts) {
+  MapReader map(address);
+  map.begin_snapshot();
+  (void)sessions_but(map, options.drop_sessions);
+  const std::set<std::int64_t> kept = remaining_places(map, options);
+  counts.places_after = static_cast<std::int64_t>(kept.size());
   std::vector<std::int64_t> thinned;
   map.for_each_place([&](const MapPlace& place) {
     ++counts.places_before;
@@ -303,17 +307,11 @@ std::vector<MapSession> sessions_but(const MapReader& map, const std::vector<int
   return sessions;
 }
 
-/// Robots may begin sessions meanwhile, whose places are kept.
 CompactCounts compact_on_server(const std::string& address, const CompactOptions& options) {
   const auto database = open_map(address, MapDatabase::Access::link);
   check_owns(*database);
-  MapReader map(address);
-  (void)sessions_but(map, options.drop_sessions);
   CompactCounts counts{.bytes_before = static_cast<std::uintmax_t>(database->bytes())};
-  const std::set<std::int64_t> kept = remaining_places(map, options);
-  const std::vector<std::int64_t> thinned = thinned_places(map, options, kept, counts);
-  counts.places_after = static_cast<std::int64_t>(kept.size());
-
+  const std::vector<std::int64_t> thinned = thinned_places(address, options, counts);
   const auto transaction = database->begin();
   for (const int session : options.drop_sessions) {
     for (const char* table : {"relative_pose", "rejected", "loop"}) {
