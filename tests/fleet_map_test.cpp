@@ -308,8 +308,8 @@ TEST_F(FleetMap, AServerThatIsAwayIsNamed) {
     }
     EXPECT_TRUE(is_so());
   };
-  sql("ALTER DATABASE other WITH ALLOW_CONNECTIONS false; SELECT pg_terminate_backend(pid) FROM "
-      "pg_stat_activity WHERE datname = 'other'");
+  sql("ALTER DATABASE other WITH ALLOW_CONNECTIONS false");  // committed before they connect again
+  sql("SELECT pg_terminate_backend(pid) FROM pg_stat_activity WHERE datname = 'other'");
   wait_until([&] { return map.features(6)->keypoints.empty(); });
   wait_until([&] {
     map.news();
