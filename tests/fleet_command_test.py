@@ -502,6 +502,8 @@ class FleetTest(CommandTest):
         image = sorted(self.images.iterdir())[3]
         query = (image, "--json", "--places", "30")
         self.assertEqual(self.lines("query", " ".join(addresses), *query), self.lines("query", one, *query))
+        self.assert_fails(loopbit("run", self.images, "--map", f"{third} {first} {self.town}", "--no-report",
+                                  cwd=self.scratch), 2, "Session 1 in", "is another one", "--first-session")
 
     def test_several_servers_are_shown_together(self):
         addresses, _ = self.new_shards()
