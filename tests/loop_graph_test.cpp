@@ -263,6 +263,7 @@ TEST(LoopGraphTest, FactorsAreThoseOfTheMatrix) {
       EXPECT_TRUE(factors.are_positive());
       const graph::Matrix6d inverse = matrix.inverse();
       EXPECT_LE((factors.inverse() - inverse).norm(), 1e-9 * inverse.squaredNorm());
+      EXPECT_EQ(factors.inverse(), factors.inverse().transpose());
       const graph::Vector6d v = root.col(0);
       EXPECT_NEAR(factors.mahalanobis_sq(v), v.dot(inverse * v), 1e-9 * inverse.norm());
     }

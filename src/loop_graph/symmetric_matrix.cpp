@@ -21,7 +21,10 @@ Matrix6d Factors::square_root() const {
   return roots.asDiagonal() * lower.transpose();
 }
 
-Matrix6d Factors::inverse() const { return factors_.solve(Matrix6d::Identity()); }
+Matrix6d Factors::inverse() const {
+  const Matrix6d inverse = factors_.solve(Matrix6d::Identity());
+  return (inverse + inverse.transpose()) / 2;
+}
 
 double Factors::mahalanobis_sq(const Vector6d& v) const { return v.dot(factors_.solve(v)); }
 

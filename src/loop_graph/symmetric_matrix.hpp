@@ -24,7 +24,7 @@ class Factors {
   [[nodiscard]] bool are_positive() const;
   /// S with S' S = M.
   [[nodiscard]] Matrix6d square_root() const;
-  /// If they are positive.
+  /// If they are positive. Symmetric to the last bit.
   [[nodiscard]] Matrix6d inverse() const;
   /// v' M^-1 v
   [[nodiscard]] double mahalanobis_sq(const Vector6d& v) const;
