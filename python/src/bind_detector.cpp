@@ -388,8 +388,8 @@ void bind_detector(py::module_& module) {
            "Without options, uses those of the map, or the defaults. With a map, all places of its "
            "sessions are candidates, whatever the exclusion window. A MapWriter also stores the "
            "processed frames; a MapReader or ShardedMap is only queried. A map serves one "
-           "detector. Raises "
-           "OptionError if the map was made with other settings of binary_content or surf.")
+           "detector. Raises OptionError if the map was made with other settings of binary_content "
+           "or surf.")
       .def("process", &SharedDetector::process, py::arg("image"),
            py::arg("timestamp_s") = py::none(), py::arg("evidence") = py::none(),
            py::arg("allowed") = py::none(), py::arg("odometry") = py::none(),

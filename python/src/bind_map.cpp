@@ -250,8 +250,7 @@ void bind_shards(py::module_& module) {
       module, "ShardedMap",
       "Reads a map whose sessions are distributed over several servers. A detector of it gives the "
       "answers of one map with all sessions; it only queries. A server that does not answer is "
-      "left "
-      "out from then on.")
+      "left out from then on.")
       .def(py::init<const std::vector<std::string>&, std::size_t>(), py::arg("addresses"),
            py::arg("cache_mb") = kMapCache_mb, Free(),
            "Raises the error of the first server if none can be asked, and OptionError if two have "

@@ -73,13 +73,13 @@ void SharedMap::reject(const SessionFrame& query, const SessionFrame& match) {
 
 std::optional<LoopDetectorOptions> SharedReader::options() const {
   const auto guard = lock();
-  if (reader_.sessions().empty()) return std::nullopt;
-  return reader_.options();
+  if (map_.sessions().empty()) return std::nullopt;
+  return map_.options();
 }
 
 std::optional<LoopDetectorOptions> SharedShards::options() const {
   const auto guard = lock();
-  return shards_.options();
+  return map_.options();
 }
 
 }  // namespace loopbit::python

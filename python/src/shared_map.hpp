@@ -67,74 +67,62 @@ class SharedMap : public MapStorage, private PlaceSearch {
   mutable std::mutex mutex_;
 };
 
-class SharedReader : public SharedMap {
+/// One that is a Map of the library.
+template <typename Map>
+class SharedAs : public SharedMap {
+ public:
+  /// Calls use(map) exclusively and returns its result.
+  template <typename Use>
+  auto exclusively(Use&& use) {
+    const auto guard = lock();
+    return use(map_);
+  }
+
+ protected:
+  /// `arguments`: of the Map's constructor.
+  template <typename... Arguments>
+  explicit SharedAs(const std::string& path, Arguments&&... arguments)
+      : SharedMap(without_secrets(path)), map_(std::forward<Arguments>(arguments)...) {}
+
+  Map map_;
+
+ private:
+  [[nodiscard]] MapStorage& storage() override { return map_; }
+};
+
+class SharedReader : public SharedAs<MapReader> {
  public:
   SharedReader(const std::filesystem::path& path, std::size_t cache_mb)
-      : SharedMap(without_secrets(path.string())), reader_(path.string(), cache_mb) {}
+      : SharedAs(path.string(), path.string(), cache_mb) {}
 
   [[nodiscard]] std::optional<LoopDetectorOptions> options() const override;
-
-  /// Calls use(reader) exclusively and returns its result.
-  template <typename Use>
-  auto exclusively(Use&& use) {
-    const auto guard = lock();
-    return use(reader_);
-  }
-
- private:
-  [[nodiscard]] MapStorage& storage() override { return reader_; }
-
-  MapReader reader_;
 };
 
-class SharedShards : public SharedMap {
+class SharedShards : public SharedAs<ShardedMap> {
  public:
   SharedShards(const std::vector<std::string>& addresses, std::size_t cache_mb)
-      : SharedMap(without_secrets(fmt::format("{}", fmt::join(addresses, " ")))),
-        shards_(addresses, cache_mb) {}
+      : SharedAs(fmt::format("{}", fmt::join(addresses, " ")), addresses, cache_mb) {}
 
   [[nodiscard]] std::optional<LoopDetectorOptions> options() const override;
-
-  /// As SharedReader's.
-  template <typename Use>
-  auto exclusively(Use&& use) {
-    const auto guard = lock();
-    return use(shards_);
-  }
-
- private:
-  [[nodiscard]] MapStorage& storage() override { return shards_; }
-
-  ShardedMap shards_;
 };
 
-class SharedWriter : public SharedMap {
+class SharedWriter : public SharedAs<MapWriter> {
  public:
   SharedWriter(const std::filesystem::path& path, const LoopDetectorOptions& options,
                const std::string& name, bool keep_images, std::size_t cache_mb,
                const std::optional<std::filesystem::path>& queue)
-      : SharedMap(without_secrets(path.string())),
-        options_(options),
-        writer_(path.string(), options, name, keep_images ? picture_jpeg : EncodeImage{},
-                cache_mb) {
-    if (queue) writer_.set_queue(queue->string());
+      : SharedAs(path.string(), path.string(), options, name,
+                 keep_images ? picture_jpeg : EncodeImage{}, cache_mb),
+        options_(options) {
+    if (queue) map_.set_queue(queue->string());
   }
 
   [[nodiscard]] std::optional<LoopDetectorOptions> options() const override { return options_; }
 
-  /// As SharedReader's.
-  template <typename Use>
-  auto exclusively(Use&& use) {
-    const auto guard = lock();
-    return use(writer_);
-  }
-
  private:
-  void check_process() const override { writer_.check_process(); }
-  [[nodiscard]] MapStorage& storage() override { return writer_; }
+  void check_process() const override { map_.check_process(); }
 
   LoopDetectorOptions options_;
-  MapWriter writer_;
 };
 
 }  // namespace loopbit::python
