@@ -276,7 +276,8 @@ void compact_command(const std::string& path, const CompactOptions& options) {
              static_cast<double>(counts.bytes_after) / 1e6,
              static_cast<double>(counts.bytes_before) / 1e6);
   if (is_map_address(path)) {
-    fmt::print("freed      for new places; VACUUM FULL returns it to the server's disk\n");
+    fmt::print(
+        "note       new places use the space that is free; VACUUM FULL returns it to the disk\n");
   }
 }
 

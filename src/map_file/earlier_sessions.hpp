@@ -58,7 +58,7 @@ class EarlierSessions {
   /// By session of the query, then in the order in which they were found.
   std::vector<MapLoop> loops();
 
-  /// What the two functions above visit, is not read again.
+  /// Call this when the two functions above are not called any more.
   void end_snapshots();
 
   /// Of a map on one server; 0 otherwise.
