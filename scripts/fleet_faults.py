@@ -1,6 +1,6 @@
 # SPDX-FileCopyrightText: 2026 The loopbit authors
 # SPDX-License-Identifier: MIT
-"""Servers that are killed or cut off while a robot adds to their map, for scripts/bench_fleet."""
+"""Servers that are killed, cut off or full while a robot adds to their map, for scripts/bench_fleet."""
 
 import csv
 import math
@@ -15,6 +15,7 @@ SEED = 37
 MAX_PAUSE_S = 2.5    # between faults
 MAX_DEAD_S = 2
 MAX_CUT_S = 12       # an answer is awaited for 10 s
+MAX_FULL_S = 5
 POLL_S = 0.02
 GIVEN_UP_S = 60
 NEAR_M = 25
@@ -95,15 +96,17 @@ class Town:
 
 
 class Faults:
-    """So many of each kind, in an order and at times that are always the same."""
+    """So many of each kind, in an order and at times that are always the same. Full disks are the first
+    server's, since nothing is written to the second."""
 
-    def __init__(self, town, kills, cuts):
+    def __init__(self, town, numbers):
         self.town = town
         self.random = random.Random(SEED)
-        self.kinds = ["kill"] * kills + ["cut"] * cuts
+        self.kinds = [kind for kind, number in numbers.items() for _ in range(number)]
         self.random.shuffle(self.kinds)
-        self.found = {"kills": kills, "cuts": cuts, "second_server": 0, "fault_runs": 0, "fault_frames": 0,
-                      "merged_later": 0, "kill_lost": 0, "wrong_answers": 0, "other_matches": 0, "missed_loops": 0}
+        self.found = {"kills": numbers["kill"], "cuts": numbers["cut"], "full_disks": numbers["full"],
+                      "second_server": 0, "fault_runs": 0, "fault_frames": 0, "merged_later": 0, "kill_lost": 0,
+                      "wrong_answers": 0, "other_matches": 0, "missed_loops": 0}
         self.recovery_s = []
 
     def disturb(self, kind, server):
@@ -112,9 +115,12 @@ class Faults:
             server.kill()
             time.sleep(self.random.uniform(0, MAX_DEAD_S))
             server.start()
-        else:
+        elif kind == "cut":
             with server.frozen():
                 time.sleep(self.random.uniform(0, MAX_CUT_S))
+        else:
+            with server.full():
+                time.sleep(self.random.uniform(0, MAX_FULL_S))
         return time.monotonic()
 
     def wait_for_frames(self, name, number, run):
@@ -140,8 +146,9 @@ class Faults:
                 if run.poll() is not None:
                     break
                 before = self.town.saved_frames(name)
-                is_first = not on_two or self.random.random() < 0.5
-                again = self.disturb(self.kinds.pop(), self.town.server if is_first else self.town.second)
+                kind = self.kinds.pop()
+                is_first = not on_two or kind == "full" or self.random.random() < 0.5
+                again = self.disturb(kind, self.town.server if is_first else self.town.second)
                 goes_on = self.wait_for_frames(name, before, run)
                 self.found["second_server"] += not is_first
                 if goes_on and is_first:
@@ -171,9 +178,9 @@ class Faults:
         town.server.sql("postgres", f"DROP DATABASE {name}")
 
 
-def measure(town, kills, cuts):
-    """The fields of the faults' line, by name."""
-    faults = Faults(town, kills, cuts)
+def measure(town, numbers):
+    """The fields of the faults' line, by name. `numbers`: of faults, by kind."""
+    faults = Faults(town, numbers)
     while faults.kinds:
         faults.run()
     recovery = faults.recovery_s or [0]

@@ -80,18 +80,25 @@ def send(process, number):
 
 class PostgresServer:
     """A running server, whose superuser is "admin". With `safe`, commits are on disk. `extension`: the folder
-    of a build with loopbit.so and what belongs to it; the server has it then. `limit_s`: for a call of sql()."""
+    of a build with loopbit.so and what belongs to it; the server has it then. `limit_s`: for a call of sql().
+    `disk_mb`: its data are on a disk of their own, in memory, of that size; only root may make one."""
 
-    def __init__(self, safe=False, extension=None, limit_s=None):
+    def __init__(self, safe=False, extension=None, limit_s=None, disk_mb=None):
         self.limit_s = limit_s
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="loopbit_pg_"))
-        self.data = self.folder / "data"
+        self.disk = self.folder / "disk"
+        self.data = self.disk / "data"
+        self.disk.mkdir()
+        self.has_own_disk = disk_mb is not None
+        if self.has_own_disk:
+            subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={disk_mb}m", "tmpfs", self.disk], check=True)
         self.port = free_port()
         self.process = None
         self.programs = programs_with(extension, self.folder) if extension else programs()
         self.as_nobody = {}
         if os.geteuid() == 0:
-            shutil.chown(self.folder, "nobody", "nogroup")
+            for folder in (self.folder, self.disk):
+                shutil.chown(folder, "nobody", "nogroup")
             self.as_nobody = {"user": "nobody", "group": "nogroup", "extra_groups": []}
         password = self.folder / "password"
         password.write_text(PASSWORD)
@@ -150,6 +157,38 @@ class PostgresServer:
         for lock in (self.data / "postmaster.pid", self.folder / f".s.PGSQL.{self.port}.lock"):
             lock.unlink()
 
+    def runs(self):
+        """Whether it takes connections."""
+        return subprocess.run([programs() / "pg_isready", "-q", "-h", self.folder, "-p", str(self.port)],
+                              check=False).returncode == 0
+
+    @contextlib.contextmanager
+    def full(self):
+        """A server whose disk, of its own, is full. It may end itself; afterwards it runs again."""
+        stop = threading.Event()
+
+        def fill():
+            with (self.disk / "ballast").open("wb", buffering=0) as ballast:
+                while not stop.wait(0.02):    # the server may have removed something
+                    free = os.statvfs(self.disk).f_bavail * os.statvfs(self.disk).f_frsize
+                    with contextlib.suppress(OSError):
+                        if free:
+                            os.posix_fallocate(ballast.fileno(), ballast.tell(), free)
+                            ballast.seek(0, os.SEEK_END)
+
+        filling = threading.Thread(target=fill)
+        filling.start()
+        try:
+            yield
+        finally:
+            stop.set()
+            filling.join()
+            (self.disk / "ballast").unlink()
+            while not self.runs():
+                if not (self.data / "postmaster.pid").exists():
+                    self.start()
+                time.sleep(0.01)
+
     def address(self, database, user="admin", password=ENCODED_PASSWORD):
         secret = f":{password}" if password else ""
         return f"postgresql://{user}{secret}@127.0.0.1:{self.port}/{database}"
@@ -193,6 +232,8 @@ class PostgresServer:
     def close(self):
         with contextlib.suppress(subprocess.CalledProcessError):
             self.call("pg_ctl", "-D", self.data, "-m", "immediate", "-w", "stop")
+        if self.has_own_disk:
+            subprocess.run(["umount", self.disk], check=True)
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def __enter__(self):
