@@ -184,29 +184,38 @@ std::unique_ptr<MapDatabase> map_without_features(const std::string& path) {
   return open_map(path, MapDatabase::Access::read);
 }
 
-TEST_F(MapThreads, FeaturesAlongAPathAreReadAhead) {
+TEST_F(MapThreads, FeaturesAlongAPathAreReadAheadOnce) {
   constexpr int kFrames = 40;
   constexpr std::chrono::seconds kMost{60};
   const std::string map_path = path("map.db");
   write_frames(map_path, kFrames);
   const auto other_map = map_without_features(path("without.db"));
   Damage damage;
-  for (const int step : {1, -1, 3}) {
-    ServerFeatures ahead(open_map(map_path, MapDatabase::Access::read), *other_map);
-    const auto is_ahead = [&](std::int64_t place) {
-      const auto features = ahead.take(place, {}, kMost, damage);
-      if (features->keypoints.empty()) return false;
-      EXPECT_EQ(features->descriptors, few_features(static_cast<int>(place) - 1).descriptors);
-      return true;
-    };
-    EXPECT_FALSE(is_ahead(18));
-    EXPECT_FALSE(is_ahead(27));  // no path
+  std::unique_ptr<ServerFeatures> ahead;
+  const auto begin = [&] {
+    ahead =
+        std::make_unique<ServerFeatures>(open_map(map_path, MapDatabase::Access::read), *other_map);
+  };
+  const auto is_ahead = [&](std::int64_t place) {
+    const auto features = ahead->take(place, {}, kMost, damage);
+    if (features->keypoints.empty()) return false;
+    EXPECT_EQ(features->descriptors, few_features(static_cast<int>(place) - 1).descriptors);
+    return true;
+  };
+  for (const int step : {1, -1, 2}) {
+    begin();
     int place = step > 0 ? 1 : kFrames;
     EXPECT_FALSE(is_ahead(place));
     EXPECT_FALSE(is_ahead(place += step));
     while ((place += step) > 0 && place <= kFrames) EXPECT_TRUE(is_ahead(place)) << place;
     EXPECT_FALSE(is_ahead(place));  // there is none
   }
+  begin();
+  for (const int place : {18, 27, 21, 30, 24, 22}) EXPECT_FALSE(is_ahead(place)) << "no path";
+  begin();
+  for (const int place : {6, 1, 2}) EXPECT_FALSE(is_ahead(place));
+  for (const int place : {3, 4, 5}) EXPECT_TRUE(is_ahead(place));
+  for (const int place : {6, 4, 2, 1}) EXPECT_FALSE(is_ahead(place)) << "the caller has it";
 }
 
 TEST_F(MapThreads, NothingIsReadAheadWhileTheMapCannotBeRead) {

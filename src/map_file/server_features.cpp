@@ -3,7 +3,9 @@
 #include "server_features.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdlib>
+#include <iterator>
 #include <utility>
 
 #include "loopbit/error.hpp"
@@ -13,9 +15,15 @@
 namespace loopbit {
 namespace {
 
+/// Places that are read by one statement.
+constexpr std::int64_t kBlock = 4;
 /// 5 MB of features. A robot may follow several sessions at once.
-constexpr std::size_t kMaxBlocks = 16;
-constexpr std::size_t kMaxRecent = 16;
+constexpr std::size_t kMaxBlocks = 32;
+/// Of so many places the caller has the features: its cache holds 1,500 by default.
+constexpr std::size_t kMaxAsked = 1024;
+/// A path goes on from one of so many places, those of about three frames.
+constexpr std::ptrdiff_t kMaxRecent = 32;
+constexpr std::int64_t kMaxStep = 2;
 
 }  // namespace
 
@@ -63,44 +71,46 @@ std::shared_ptr<const Features> ServerFeatures::take(std::int64_t place, const S
 std::shared_ptr<const Features> ServerFeatures::take_read(std::int64_t place,
                                                           std::chrono::nanoseconds most) {
   std::unique_lock lock(mutex_);
-  const std::int64_t number = place / kBlock;
   // The other thread drops the block if the server is lost.
   read_.wait_for(lock, most, [&] {
-    const Block* const block = find(number);
-    return !block || block->is_read;
+    const auto block = find(place);
+    return block == blocks_.end() || block->is_read;
   });
   std::shared_ptr<const Features> features;
-  if (Block* const block = find(number); block && block->is_read) {
-    features = std::exchange(block->features.at(static_cast<std::size_t>(place % kBlock)), {});
-    if (!features) {  // it was added since
-      std::erase_if(blocks_, [&](const Block& each) { return each.number == number; });
-    }
+  if (const auto block = find(place); block != blocks_.end() && block->is_read) {
+    features = std::exchange(block->features[static_cast<std::size_t>(place - block->first)], {});
+    if (!features) blocks_.erase(block);  // it was added since
   }
-  want_around(place);
+  want_after(place);
   return features;
 }
 
-ServerFeatures::Block* ServerFeatures::find(std::int64_t number) {
-  const auto found = std::ranges::find(blocks_, number, &Block::number);
-  return found == blocks_.end() ? nullptr : &*found;
-}
-
-/// If the robot was close to `place` before, it goes on in the same direction.
-void ServerFeatures::want_around(std::int64_t place) {
-  const auto before = std::find_if(recent_.rbegin(), recent_.rend(), [&](std::int64_t each) {
-    return each != place && std::abs(each - place) <= kBlock;
+/// The block with a place.
+std::deque<ServerFeatures::Block>::iterator ServerFeatures::find(std::int64_t place) {
+  return std::ranges::find_if(blocks_, [&](const Block& block) {
+    return block.first <= place && place < block.first + std::ssize(block.features);
   });
-  if (before != recent_.rend() && !is_away_) {
-    want(place / kBlock);
-    want((*before < place ? place + kBlock : place - kBlock) / kBlock);
-  }
-  recent_.push_back(place);
-  if (recent_.size() > kMaxRecent) recent_.pop_front();
 }
 
-void ServerFeatures::want(std::int64_t number) {
-  if (find(number)) return;
-  blocks_.push_back({.number = number});
+/// If the robot was close to `place` just before, it goes on in the same direction.
+void ServerFeatures::want_after(std::int64_t place) {
+  const auto end = asked_.rbegin() + std::min(std::ssize(asked_), kMaxRecent);
+  const auto found = std::find_if(asked_.rbegin(), end, [&](std::int64_t each) {
+    return each != place && std::abs(each - place) <= kMaxStep;
+  });
+  const std::int64_t before = found == end ? place : *found;
+  asked_.push_back(place);
+  if (asked_.size() > kMaxAsked) asked_.pop_front();
+  if (before == place || is_away_) return;
+  const std::int64_t step = before < place ? 1 : -1;
+  std::int64_t last = place;
+  while (std::abs(last - place) < kBlock && find(last + step) == blocks_.end() &&
+         std::ranges::find(asked_, last + step) == asked_.end()) {
+    last += step;
+  }
+  if (last == place) return;
+  blocks_.push_back({.first = std::min(place + step, last)});
+  blocks_.back().features.resize(static_cast<std::size_t>(std::abs(last - place)));
   if (blocks_.size() > kMaxBlocks) blocks_.pop_front();
   wanted_.notify_all();
 }
@@ -145,17 +155,18 @@ void ServerFeatures::reach_again(std::unique_lock<std::mutex>& lock) {
 
 /// If the server was away, no block, to see whether it is back.
 void ServerFeatures::read_next(std::unique_lock<std::mutex>& lock) {
-  Block read{.number = is_away_ ? 0 : unread()->number, .is_read = true};
+  Block read = is_away_ ? Block{} : *unread();
   lock.unlock();
   if (ahead_->is_lost()) ahead_->reconnect();
-  const std::int64_t first = read.number * kBlock;
-  for_each_features(*ahead_, {first, first + kBlock - 1}, [&](std::int64_t key, Features features) {
-    read.features.at(static_cast<std::size_t>(key - first)) =
+  const KeyRange keys{read.first, read.first + std::ssize(read.features) - 1};
+  for_each_features(*ahead_, keys, [&](std::int64_t key, Features features) {
+    read.features[static_cast<std::size_t>(key - read.first)] =
         std::make_shared<const Features>(std::move(features));
   });
+  read.is_read = true;
   lock.lock();
   is_away_ = false;
-  if (Block* const block = find(read.number)) *block = std::move(read);
+  if (const auto block = find(read.first); block != blocks_.end()) *block = std::move(read);
   read_.notify_all();
 }
 

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <cstddef>
@@ -11,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <thread>
+#include <vector>
 
 #include "loopbit/map_database.hpp"
 #include "loopbit/surf.hpp"
@@ -40,12 +40,11 @@ class ServerFeatures {
                                        std::chrono::nanoseconds most, Damage& damage);
 
  private:
-  /// Places that are read by one statement.
-  static constexpr std::int64_t kBlock = 8;
+  /// Successive places.
   struct Block {
-    std::int64_t number;  ///< key / kBlock
+    std::int64_t first = 0;
     bool is_read = false;
-    std::array<std::shared_ptr<const Features>, kBlock> features = {};  ///< null: none, or taken
+    std::vector<std::shared_ptr<const Features>> features = {};  ///< null: none, or taken
   };
 
   std::shared_ptr<const Features> take_read(std::int64_t place, std::chrono::nanoseconds most);
@@ -53,9 +52,8 @@ class ServerFeatures {
   void reach_again(std::unique_lock<std::mutex>& lock);
   void read_next(std::unique_lock<std::mutex>& lock);
   [[nodiscard]] std::deque<Block>::iterator unread();
-  [[nodiscard]] Block* find(std::int64_t number);
-  void want_around(std::int64_t place);
-  void want(std::int64_t number);
+  [[nodiscard]] std::deque<Block>::iterator find(std::int64_t place);
+  void want_after(std::int64_t place);
 
   std::unique_ptr<MapDatabase> ahead_;
   MapDatabase& database_;
@@ -64,10 +62,10 @@ class ServerFeatures {
   std::mutex mutex_;  ///< guards all below
   std::condition_variable wanted_;
   std::condition_variable read_;
-  std::deque<Block> blocks_;         ///< the newest last
-  std::deque<std::int64_t> recent_;  ///< places that were asked for, the newest last
-  bool is_away_ = false;             ///< the server, from ahead_
-  bool is_lost_ = false;  ///< the server, from database_, which only the thread then uses
+  std::deque<Block> blocks_;        ///< the newest last
+  std::deque<std::int64_t> asked_;  ///< places that were taken, the newest last
+  bool is_away_ = false;            ///< the server, from ahead_
+  bool is_lost_ = false;            ///< the server, from database_, which only the thread then uses
   bool stop_ = false;
   std::thread thread_;  ///< last: it uses all the others
 };
