@@ -3,8 +3,11 @@
 #include "displacement_votes.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <random>
+#include <span>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -38,11 +41,15 @@ std::vector<Match> nearest(const Features& query, const Features& place) {
   return DisplacementVotes(10.0).nearest_matches(query, place, look);
 }
 
-int votes(const Features& query, const Features& place) {
+Votes counted(const Features& query, const Features& place) {
   FirstLook look;
   Verifier().match_strongest(query, place, look);
-  return DisplacementVotes(10.0).count(query, place, look);
+  DisplacementVotes votes(10.0);
+  votes.begin(query, std::span(&look, 1));
+  return votes.count(query, place, look);
 }
+
+int votes(const Features& query, const Features& place) { return counted(query, place).count; }
 
 TEST(NearestMatches, NeedNoRatioButAreOneToOne) {
   const Features place = scattered(40, 4);
@@ -81,6 +88,66 @@ TEST(DisplacementVotes, ANeighbourhoodVotesOnceAndScalesMustAgree) {
   Features nearer = place;
   for (Keypoint& keypoint : nearer.keypoints) keypoint.scale *= 3;
   EXPECT_EQ(votes(nearer, place), 0);
+}
+
+TEST(DisplacementVotes, TellWhereAndHowManyElsewhere) {
+  const Features place = scattered(60, 5);
+  Features query = place;
+  for (std::size_t i = 0; i < query.keypoints.size(); ++i) {
+    query.keypoints[i].x_px += i % 3 == 0 ? -100.0F : 35.0F;
+  }
+  const Votes found = counted(query, place);
+  EXPECT_EQ(found.apart.in_square(found.square), 40);
+  EXPECT_EQ(found.square, found.apart.fullest());
+  const auto others = Displacements::moved(found.square, -4, 0);
+  EXPECT_EQ(found.apart.in_square(others), 20) << "135 px are a little more than four bins";
+  EXPECT_EQ(found.apart.in_square(Displacements::moved(found.square, 0, 60)), 0);
+  EXPECT_EQ(found.apart.in_square(Displacements::moved(found.square, 0, -60)), 0);
+}
+
+TEST(DisplacementVotes, ANeighbourhoodCountsOnceForEachDisplacement) {
+  Features place = scattered(40, 6);
+  Features query = place;
+  for (std::size_t i = 0; i < 4; ++i) {
+    query.keypoints[i].x_px = 300 + 2 * static_cast<float>(i);
+    query.keypoints[i].y_px = 300;
+    place.keypoints[i] = query.keypoints[i];
+    if (i >= 2) place.keypoints[i].x_px -= 200;  // two of them moved
+  }
+  const Votes found = counted(query, place);
+  EXPECT_EQ(found.count, 37);
+  int all = 0;
+  for (int y = 0; y < Displacements::kRows; y += 2) {
+    for (int x = 0; x < Displacements::kRows; x += 2) {
+      all += found.apart.in_square(Displacements::moved(0, x, y));
+    }
+  }
+  EXPECT_EQ(all, 38);
+}
+
+TEST(Neighbourhoods, AreThoseOfEachPair) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> place_px(0, 300);
+  std::uniform_real_distribution<float> scale(1, 12);
+  std::vector<Keypoint> keypoints;
+  std::vector<std::int16_t> asked;
+  for (std::int16_t i = 0; i < 200; ++i) {
+    keypoints.push_back({place_px(random), place_px(random), scale(random), 0});
+    if (i % 5 != 0) asked.push_back(i);
+  }
+  Neighbourhoods neighbourhoods;
+  for (int again = 0; again < 2; ++again) neighbourhoods.find(keypoints, asked, 5);
+  for (const std::int16_t i : asked) {
+    std::vector<std::int16_t> expected;
+    for (const std::int16_t j : asked) {
+      const Keypoint& a = keypoints[static_cast<std::size_t>(i)];
+      const Keypoint& b = keypoints[static_cast<std::size_t>(j)];
+      const float distance = std::hypot(a.x_px - b.x_px, a.y_px - b.y_px);
+      if (j < i && distance < 5 * std::min(a.scale, b.scale)) expected.push_back(j);
+    }
+    const auto found = neighbourhoods.before(i);
+    EXPECT_TRUE(std::ranges::is_permutation(found, expected)) << i;
+  }
 }
 
 TEST(InlierWorth, GrowsWithTheShareUpToTheFullOne) {

@@ -25,8 +25,9 @@ struct Found {
 using FoundAt = std::map<std::ptrdiff_t, Found>;
 
 inline VerifiedCandidate candidate(std::ptrdiff_t step, Found found) {
-  VerifiedCandidate c{
-      .candidate = {static_cast<PlaceId>(step), 0.5}, .step = step, .votes = found.votes};
+  VerifiedCandidate c{.candidate = {static_cast<PlaceId>(step), 0.5},
+                      .step = step,
+                      .votes = {.count = found.votes}};
   if (found.inliers >= 0) {
     c.geometry = CandidateGeometry{
         .matches = 100, .inliers = found.inliers, .distinct_inliers = found.inliers};

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <utility>
 
 namespace loopbit {
@@ -104,11 +105,16 @@ void CandidateVerifier::complete(const Query& query, std::vector<VerifiedCandida
 void CandidateVerifier::look(Frame& frame) {
   const Features& query = frame.query.features;
   Verifier& verifier = frame.query.closely ? thorough_verifier_ : verifier_;
-  for (std::size_t i = 0; i < frame.verified.size(); ++i) {
-    VerifiedCandidate& v = frame.verified[i];
-    const Features& place = places_.features(v.candidate.place);
-    verifier.match_strongest(query, place, looks_[i]);
-    v.votes = votes_.count(query, place, looks_[i]);
+  const auto place = [&](std::size_t i) -> const Features& {
+    return places_.features(frame.verified[i].candidate.place);
+  };
+  const std::span looks = std::span(looks_).first(frame.verified.size());
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    verifier.match_strongest(query, place(i), looks[i]);
+  }
+  votes_.begin(query, looks);
+  for (std::size_t i = 0; i < looks.size(); ++i) {
+    frame.verified[i].votes = votes_.count(query, place(i), looks[i]);
   }
 }
 

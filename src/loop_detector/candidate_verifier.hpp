@@ -39,7 +39,7 @@ struct VerifiedCandidate {
   Candidate candidate;
   std::ptrdiff_t step = 0;  ///< the candidate's position along the path, see RecentView::step_of
   bool may_match = true;    ///< false: it only shows what wrong places have
-  int votes = 0;            ///< see DisplacementVotes
+  Votes votes = {};
   std::optional<CandidateGeometry> geometry = std::nullopt;  ///< if it may be more than chance
 };
 

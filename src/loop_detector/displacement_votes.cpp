@@ -5,20 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <numeric>
 
 namespace loopbit {
 namespace {
 
 /// Of a feature nearest to each other on two levels of the pyramid, which are an octave apart.
 constexpr float kMaxScaleRatio = 2.0F;
-/// Displacements up to the whole image either way; a square of four bins is a tenth of its width.
-constexpr int kBinsPerWidth = 20;
-constexpr int kBins = 2 * kBinsPerWidth + 2;
-/// Bins are numbered row by row, with one more at the end of each row, which stays empty.
-constexpr int kBinStride = kBins + 1;
-constexpr std::int16_t kNoBin = -1;
-
-using Bins = std::array<std::int16_t, std::size_t{kBins} * kBinStride>;
+constexpr int kNoBin = -1;
 
 /// std::floor() is a call where the processor's own instruction may be missing.
 int floor_of(float value) {
@@ -26,36 +20,13 @@ int floor_of(float value) {
   return whole - (value < static_cast<float>(whole) ? 1 : 0);
 }
 
-std::int16_t bin_of(const Keypoint& a, const Keypoint& b, float bin_px) {
+int bin_of(const Keypoint& a, const Keypoint& b, float bin_px) {
+  constexpr int kRows = Displacements::kRows;
   if (a.scale > kMaxScaleRatio * b.scale || b.scale > kMaxScaleRatio * a.scale) return kNoBin;
-  const int x = floor_of((a.x_px - b.x_px) / bin_px) + kBins / 2;
-  const int y = floor_of((a.y_px - b.y_px) / bin_px) + kBins / 2;
-  const bool is_in = 0 <= x && x < kBins && 0 <= y && y < kBins;
-  return is_in ? static_cast<std::int16_t>(y * kBinStride + x) : kNoBin;
-}
-
-/// The upper left bin of the square of four with most displacements; of equals the first one.
-std::int16_t fullest_square(const std::vector<std::int16_t>& bins) {
-  Bins displacements{};
-  for (const std::int16_t bin : bins) {
-    if (bin != kNoBin) ++displacements[static_cast<std::size_t>(bin)];
-  }
-  constexpr std::size_t kSquares = Bins{}.size() - kBinStride - 1;
-  Bins squares;  // NOLINT(cppcoreguidelines-pro-type-member-init): written next
-  std::int16_t most = 0;
-  for (std::size_t i = 0; i < kSquares; ++i) {
-    squares[i] = static_cast<std::int16_t>(displacements[i] + displacements[i + 1] +
-                                           displacements[i + kBinStride] +
-                                           displacements[i + kBinStride + 1]);
-    most = std::max(most, squares[i]);
-  }
-  const auto* fullest = std::find(squares.begin(), squares.begin() + kSquares, most);
-  return static_cast<std::int16_t>(fullest - squares.begin());
-}
-
-bool is_in_square(std::int16_t bin, std::int16_t square) {
-  const int offset = bin - square;
-  return offset == 0 || offset == 1 || offset == kBinStride || offset == kBinStride + 1;
+  const int x = floor_of((a.x_px - b.x_px) / bin_px) + kRows / 2;
+  const int y = floor_of((a.y_px - b.y_px) / bin_px) + kRows / 2;
+  const bool is_in = 0 <= x && x < kRows && 0 <= y && y < kRows;
+  return is_in ? Displacements::moved(0, x, y) : kNoBin;
 }
 
 const Keypoint& keypoint_of(const Features& features, int index) {
@@ -63,6 +34,30 @@ const Keypoint& keypoint_of(const Features& features, int index) {
 }
 
 }  // namespace
+
+Displacements::Displacements(const std::vector<int>& bins) {
+  for (const int bin : bins) ++bins_.at(static_cast<std::size_t>(bin));
+}
+
+int Displacements::in_square(Square square) const {
+  int sum = 0;
+  for (const int bin : {square, square + 1, square + kStride, square + kStride + 1}) {
+    if (0 <= bin && bin < kBins) sum += bins_[static_cast<std::size_t>(bin)];
+  }
+  return sum;
+}
+
+Displacements::Square Displacements::fullest() const {
+  constexpr std::size_t kSquares = kBins - kStride - 1;
+  std::array<std::int16_t, kSquares> squares;  // NOLINT(*-member-init): written next
+  std::int16_t most = 0;
+  for (std::size_t i = 0; i < kSquares; ++i) {
+    squares[i] = static_cast<std::int16_t>(bins_[i] + bins_[i + 1] + bins_[i + kStride] +
+                                           bins_[i + kStride + 1]);
+    most = std::max(most, squares[i]);
+  }
+  return static_cast<Square>(std::ranges::find(squares, most) - squares.begin());
+}
 
 void DisplacementVotes::append_nearest(const FirstLook::Group& group, std::size_t first_query,
                                        std::size_t first_place) {
@@ -91,31 +86,93 @@ const std::vector<Match>& DisplacementVotes::nearest_matches(const Features& que
   return matches_;
 }
 
-void DisplacementVotes::find_bins(const Features& query, const Features& place) {
-  const float bin_px = static_cast<float>(query.working_size_px.width) / kBinsPerWidth;
-  bins_.resize(matches_.size());
-  std::transform(matches_.begin(), matches_.end(), bins_.begin(), [&](const Match& match) {
-    return bin_of(keypoint_of(query, match.query), keypoint_of(place, match.place), bin_px);
-  });
+void Neighbourhoods::find(const std::vector<Keypoint>& keypoints,
+                          const std::vector<std::int16_t>& indices, float spacing_scales) {
+  by_x_.clear();
+  for (const std::int16_t index : indices) {
+    const Keypoint& keypoint = keypoints[static_cast<std::size_t>(index)];
+    by_x_.push_back({keypoint.x_px, keypoint.y_px, spacing_scales * keypoint.scale, index});
+  }
+  std::ranges::sort(by_x_, {}, [](const Reach& r) { return std::pair(r.x_px, r.index); });
+  pairs_.clear();
+  for (auto here = by_x_.begin(); here != by_x_.end(); ++here) {
+    for (auto there = here + 1; there != by_x_.end(); ++there) {
+      const float dx = there->x_px - here->x_px;
+      if (dx >= here->reach_px) break;
+      const float dy = there->y_px - here->y_px;
+      const float reach = std::min(here->reach_px, there->reach_px);
+      if (dx * dx + dy * dy >= reach * reach) continue;
+      pairs_.emplace_back(std::max(here->index, there->index), std::min(here->index, there->index));
+    }
+  }
+  begins_.assign(keypoints.size() + 2, 0);
+  for (const auto& [later, earlier] : pairs_) ++begins_[static_cast<std::size_t>(later) + 2];
+  std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
+  near_.resize(pairs_.size());
+  for (const auto& [later, earlier] : pairs_) {
+    near_[begins_[static_cast<std::size_t>(later) + 1]++] = earlier;
+  }
 }
 
-int DisplacementVotes::count(const Features& query, const Features& place, const FirstLook& look) {
-  nearest_matches(query, place, look);
-  find_bins(query, place);
-  const std::int16_t square = fullest_square(bins_);
-  counted_.clear();
-  for (std::size_t i = 0; i < matches_.size(); ++i) {
-    if (bins_[i] == kNoBin || !is_in_square(bins_[i], square)) continue;
-    const Keypoint& here = keypoint_of(query, matches_[i].query);
-    const bool is_new = std::none_of(counted_.begin(), counted_.end(), [&](const Keypoint& other) {
-      const double dx = here.x_px - other.x_px;
-      const double dy = here.y_px - other.y_px;
-      const double spacing = min_spacing_scales_ * std::min(here.scale, other.scale);
-      return dx * dx + dy * dy < spacing * spacing;
-    });
-    if (is_new) counted_.push_back(here);
+void DisplacementVotes::begin(const Features& query, std::span<const FirstLook> looks) {
+  std::size_t num_dark = 0;
+  std::size_t num_bright = 0;
+  for (const FirstLook& look : looks) {
+    num_dark = std::max(num_dark, look.dark.num_query);
+    num_bright = std::max(num_bright, look.bright.num_query);
   }
-  return static_cast<int>(counted_.size());
+  looked_at_.resize(num_dark + num_bright);
+  const auto first_bright = looked_at_.begin() + static_cast<std::ptrdiff_t>(num_dark);
+  std::iota(looked_at_.begin(), first_bright, std::int16_t{0});
+  std::iota(first_bright, looked_at_.end(), static_cast<std::int16_t>(query.num_dark));
+  neighbourhoods_.find(query.keypoints, looked_at_, static_cast<float>(min_spacing_scales_));
+  counted_bin_.assign(query.keypoints.size(), kNoBin);
+}
+
+Votes DisplacementVotes::count(const Features& query, const Features& place,
+                               const FirstLook& look) {
+  nearest_matches(query, place, look);
+  find_moved(query, place);
+  bins_.clear();
+  for (const Moved& moved : moved_) bins_.push_back(moved.bin);
+  Votes votes{.square = Displacements(bins_).fullest()};
+  keep_apart(Displacements::share_a_square);
+  votes.apart = Displacements(bins_);
+  std::erase_if(moved_,
+                [&](const Moved& moved) { return !Displacements::is_in(moved.bin, votes.square); });
+  keep_apart([](int /*a*/, int /*b*/) { return true; });
+  votes.count = static_cast<int>(bins_.size());
+  return votes;
+}
+
+void DisplacementVotes::find_moved(const Features& query, const Features& place) {
+  const float bin_px =
+      static_cast<float>(query.working_size_px.width) / Displacements::kBinsPerWidth;
+  moved_.clear();
+  for (const Match& match : matches_) {
+    const auto bin =
+        bin_of(keypoint_of(query, match.query), keypoint_of(place, match.place), bin_px);
+    if (bin != kNoBin) moved_.push_back({match.query, bin});
+  }
+}
+
+/// Of those in `moved_`, only those count that have none of their neighbourhood before them that
+/// `may_be_one(bin, its bin)`.
+template <typename MayBeOne>
+void DisplacementVotes::keep_apart(const MayBeOne& may_be_one) {
+  bins_.clear();
+  for (const Moved& moved : moved_) {
+    const bool is_new = std::ranges::none_of(neighbourhoods_.before(moved.feature), [&](int other) {
+      const int counted = counted_bin_[static_cast<std::size_t>(other)];
+      return counted != kNoBin && may_be_one(moved.bin, counted);
+    });
+    if (!is_new) continue;
+    counted_bin_[static_cast<std::size_t>(moved.feature)] = moved.bin;
+    bins_.push_back(moved.bin);
+  }
+  for (const Moved& moved : moved_) {
+    counted_bin_[static_cast<std::size_t>(moved.feature)] = kNoBin;
+  }
 }
 
 }  // namespace loopbit

@@ -725,7 +725,8 @@ class LoopDetector::Impl {
             [&](std::ptrdiff_t step) {
               const auto place = seen.reach ? place_of(step) : std::nullopt;
               return place ? Reach::weight(chi2(*seen.reach, *place, end)) : 1.0;
-            }};
+            },
+        .is_step = seen.look.is_step};
     seen.update =
         place_filter_.update(std::move(prior), seen.verified, num_similar, steps, known_loops_);
     if (!seen.update.match) return;

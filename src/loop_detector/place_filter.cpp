@@ -6,10 +6,9 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
-#include <numbers>
 #include <utility>
 
-#include "loopbit/median.hpp"
+#include "votes_ratio.hpp"
 
 namespace loopbit {
 namespace {
@@ -23,19 +22,11 @@ constexpr double kShareOfLaps = 0.2;
 /// Hypotheses below this are dropped: some twenty frames of evidence could not bring them back.
 constexpr double kMinProbability = 1e-6;
 
-/// A median and a deviation of fewer places tell little.
-constexpr std::size_t kMinNull = 8;
-/// The square root of a count plus 3/8 has this deviation by chance (Anscombe 1948).
-constexpr double kMinDeviation = 0.5;
-constexpr double kDeviationsPerMedian = 1.4826;  // of a normal distribution
-constexpr double kMinSigmas = -3;
-constexpr double kMaxSigmas = 12;
-/// A true place stands out by some three deviations on average, which is what a frame at night
-/// shows; one by day shows more.
-constexpr double kMeanSigmas = 3;
-/// Degrees of freedom of the null, at most: what happens in one of many places cannot be learned
-/// from thirty.
-constexpr std::size_t kMaxDegrees = 20;
+/// As likely as not, the displacement of the right place is steady.
+constexpr double kSteady = 0.5;
+/// A camera that is level displaces sideways, by ten squares either way: to know which one is worth
+/// no more.
+constexpr double kMostSteady = 10;
 /// One frame changes what is known of a place by no more.
 constexpr double kMaxLearned = 3;
 /// A place's own mean counts once it was seen by some frames.
@@ -54,20 +45,6 @@ constexpr double kFullSteps = 200;
 constexpr double kFullExcess = 4;
 /// No frame can say more.
 constexpr double kMaxLogRatio = 30;
-
-double stabilized(int count) { return std::sqrt(count + 3.0 / 8.0); }
-
-/// Density of Student's t distribution.
-double student_t(double x, double degrees) {
-  return std::exp(std::lgamma((degrees + 1) / 2) - std::lgamma(degrees / 2)) /
-         std::sqrt(degrees * std::numbers::pi) * std::pow(1 + x * x / degrees, -(degrees + 1) / 2);
-}
-
-/// Density of a sum of an exponential variable of mean `mean` and a standard normal one.
-double shifted_normal(double x, double mean) {
-  const double tail = 0.5 * std::erfc((1 / mean - x) / std::numbers::sqrt2);
-  return std::exp(-x / mean + 0.5 / (mean * mean)) * tail / mean;
-}
 
 template <typename Pairs>
 auto find_step(Pairs& pairs, std::ptrdiff_t step) {
@@ -286,13 +263,13 @@ std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>
   if (num_similar < kMinNull) return sigmas;
   std::vector<double> null;
   null.reserve(num_similar);
-  for (std::size_t i = 0; i < num_similar; ++i) null.push_back(stabilized(verified[i].votes));
-  const double middle = median(null);
-  for (double& value : null) value = std::abs(value - middle);
-  const double deviation = std::max(kMinDeviation, kDeviationsPerMedian * median(null));
+  for (std::size_t i = 0; i < num_similar; ++i) {
+    null.push_back(stabilized(verified[i].votes.count));
+  }
+  const auto votes_null = VotesNull::by_medians(std::move(null));
   for (std::size_t i = 0; i < verified.size(); ++i) {
-    const double z = (stabilized(verified[i].votes) - middle) / deviation;
-    sigmas[i] = std::clamp(z - mean_shown(verified[i].step), kMinSigmas, kMaxSigmas);
+    const double z = votes_null.sigmas(verified[i].votes.count);
+    sigmas[i] = clamped_sigmas(z - mean_shown(verified[i].step));
   }
   return sigmas;
 }
@@ -304,10 +281,14 @@ double PlaceFilter::independence() const {
   return (1 - correlation) / (1 + correlation);
 }
 
-double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null) const {
-  const auto degrees = static_cast<double>(std::min(kMaxDegrees, num_null - 1));
-  const double ratio = shifted_normal(sigmas, kMeanSigmas) / student_t(sigmas, degrees);
-  return independence() * std::log(ratio);
+/// Where the displacement is steady, votes say more; how much more is measured on its own.
+double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null,
+                                    const std::optional<SteadyDisplacements::Seen>& steady) const {
+  const double ratio = VotesRatio(num_null).of(sigmas);
+  const double known = independence() * std::log(ratio);
+  if (!steady) return known;
+  return known + std::min(independence(), steady_.independence()) *
+                     std::log(1 - kSteady + kSteady * std::min(kMostSteady, steady->ratio / ratio));
 }
 
 /// The tail of wrong places is a Lomax distribution: an exponential one whose mean is only as well
@@ -334,20 +315,25 @@ double PlaceFilter::probability_alone(const CandidateGeometry& geometry,
 }
 
 std::vector<PlaceFilter::Observed> PlaceFilter::observe(
-    const std::vector<VerifiedCandidate>& verified, std::size_t num_similar,
-    std::ptrdiff_t num_steps) const {
+    const std::vector<VerifiedCandidate>& verified, std::size_t num_similar, const Steps& known,
+    const KnownLoops& loops) const {
   const std::vector<double> sigmas = deviations(verified, num_similar);
+  const auto steady =
+      steady_.look(verified, num_similar, known.is_step,
+                   [&](std::ptrdiff_t a, std::ptrdiff_t b) { return is_near(a, b, loops); });
   std::vector<Observed> observed;
   observed.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
     Observed o{.candidate = verified[i].candidate,
                .step = verified[i].step,
                .may_match = verified[i].may_match,
-               .sigmas = sigmas[i]};
-    if (num_similar >= kMinNull) o.votes = votes_log_ratio(sigmas[i], num_similar);
+               .sigmas = sigmas[i],
+               .square = verified[i].votes.square};
+    if (steady[i]) o.steady_sigmas = steady[i]->sigmas;
+    if (num_similar >= kMinNull) o.votes = votes_log_ratio(sigmas[i], num_similar, steady[i]);
     if (verified[i].geometry) {
       o.excess = verified[i].geometry->excess();
-      o.geometry = geometry_log_ratio(*verified[i].geometry, num_steps);
+      o.geometry = geometry_log_ratio(*verified[i].geometry, known.number);
     }
     observed.push_back(o);
   }
@@ -359,7 +345,7 @@ PlaceFilter::Update PlaceFilter::update(Belief prior,
                                         std::size_t num_similar, const Steps& known,
                                         const KnownLoops& loops) const {
   Update update;
-  update.observed = observe(verified, num_similar, known.number);
+  update.observed = observe(verified, num_similar, known, loops);
   update.has_null = num_similar >= kMinNull;
   std::erase_if(prior.places, [&](const Hypothesis& h) { return !known.may_be_at(h.step); });
   std::vector<std::ptrdiff_t> steps;
@@ -413,8 +399,14 @@ void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& nex
   } else {
     next.tail.unseen += weight;
   }
+  std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> fullest;
+  fullest.reserve(update.observed.size());
+  for (const Observed& o : update.observed) fullest.emplace_back(o.step, o.square);
   next.has_null = update.has_null;
-  if (!update.has_null) return;
+  if (!update.has_null) {
+    next.steady = steady_.prepare(std::move(fullest), {});
+    return;
+  }
   const auto deviation = [](const Observed& o) { return o.sigmas; };
   next.sigmas = largest_of_steps(wrong, deviation);
   for (const auto& [step, sigmas] : next.sigmas) {
@@ -428,6 +420,10 @@ void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& nex
     next.products += sigmas * before->second;
     next.squares += (sigmas * sigmas + before->second * before->second) / 2;
   }
+  std::erase_if(wrong, [](const Observed& o) { return !o.steady_sigmas; });
+  next.steady = steady_.prepare(std::move(fullest), largest_of_steps(wrong, [](const Observed& o) {
+                                  return o.steady_sigmas.value_or(0);
+                                }));
 }
 
 void PlaceFilter::commit(Next next) noexcept {
@@ -435,6 +431,7 @@ void PlaceFilter::commit(Next next) noexcept {
   if (!next.is_step) return;
   before_ = std::move(next.before);
   tail_ = next.tail;
+  steady_.commit(std::move(next.steady));
   if (!next.has_null) return;
   for (std::size_t i = 0; i < next.sigmas.size(); ++i) {
     Shown& shown = shown_.find(next.sigmas[i].first)->second;

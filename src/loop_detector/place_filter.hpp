@@ -14,6 +14,7 @@
 #include "candidate_verifier.hpp"
 #include "known_loops.hpp"
 #include "path_motion.hpp"
+#include "steady_displacements.hpp"
 
 namespace loopbit {
 
@@ -39,7 +40,9 @@ class PlaceFilter {
     double votes = 0;       ///< log likelihood ratio of its displacement votes
     double geometry = 0;    ///< the same of its inliers
     double sigmas = 0;      ///< votes in standard deviations of the null; 0 where there is no null
-    double excess = 0;      ///< of CandidateGeometry, 0 if it was not looked at closer
+    Displacements::Square square = 0;                    ///< of Votes
+    std::optional<double> steady_sigmas = std::nullopt;  ///< of SteadyDisplacements::Seen
+    double excess = 0;  ///< of CandidateGeometry, 0 if it was not looked at closer
 
     [[nodiscard]] double log_likelihood_ratio() const;
   };
@@ -95,6 +98,7 @@ class PlaceFilter {
     std::ptrdiff_t number = 0;                            ///< of those that may be candidates
     std::function<bool(std::ptrdiff_t)> may_be_at;        ///< false for those that are excluded
     std::function<double(std::ptrdiff_t)> return_weight;  ///< see returns_to()
+    bool is_step = true;                                  ///< see predict()
   };
 
   /// `verified`: the candidates of the frame; the first `num_similar` look most alike.
@@ -112,6 +116,7 @@ class PlaceFilter {
     Belief belief = {};
     ByStep sigmas = {};
     std::vector<double> shown = {};  ///< what is added for each of `sigmas`
+    SteadyDisplacements::Next steady = {};
     Tail tail = {};
     double products = 0;
     double squares = 0;
@@ -136,13 +141,15 @@ class PlaceFilter {
   };
 
   [[nodiscard]] std::vector<Observed> observe(const std::vector<VerifiedCandidate>& verified,
-                                              std::size_t num_similar,
-                                              std::ptrdiff_t num_steps) const;
+                                              std::size_t num_similar, const Steps& known,
+                                              const KnownLoops& loops) const;
   [[nodiscard]] std::vector<double> deviations(const std::vector<VerifiedCandidate>& verified,
                                                std::size_t num_similar) const;
   [[nodiscard]] double mean_shown(std::ptrdiff_t step) const;
   [[nodiscard]] double independence() const;
-  [[nodiscard]] double votes_log_ratio(double sigmas, std::size_t num_null) const;
+  [[nodiscard]] double votes_log_ratio(
+      double sigmas, std::size_t num_null,
+      const std::optional<SteadyDisplacements::Seen>& steady) const;
   [[nodiscard]] double geometry_log_ratio(const CandidateGeometry& geometry,
                                           std::ptrdiff_t num_steps) const;
   void learn(const Update& update, const KnownLoops& loops, Next& next) const;
@@ -151,6 +158,7 @@ class PlaceFilter {
   Belief belief_;  ///< of the last frame
   ByStep latest_sigmas_;
   std::unordered_map<std::ptrdiff_t, Shown> shown_;  ///< by step
+  SteadyDisplacements steady_;
   Tail tail_{1, 10, 10, 10};
   double same_path_products_ = 100;  ///< of deviations along a path, and their squares
   double same_path_squares_ = 200;

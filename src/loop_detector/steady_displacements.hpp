@@ -1,0 +1,71 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "candidate_verifier.hpp"
+
+namespace loopbit {
+
+/// A robot that follows an earlier path sees everything displaced in the same way from step to
+/// step. So it is known where the votes of the next place will be, and what chance gives there is
+/// less than in the fullest square of all. docs/method.md, section 4, has the formulas.
+class SteadyDisplacements {
+ public:
+  /// What a candidate shows in the square where the place before it had most votes.
+  struct Seen {
+    double sigmas = 0;  ///< from what other similar places show there
+    double ratio = 0;   ///< see VotesRatio, over squares up to one bin away
+  };
+
+  using IsNear = std::function<bool(std::ptrdiff_t, std::ptrdiff_t)>;
+
+  /// Of each candidate. None where the step before had no candidate one or two steps away, or where
+  /// too few of the first `num_similar` candidates are elsewhere. `is_near(a, b)`: steps that show
+  /// the same place. `is_step`: as in PlaceFilter::predict.
+  [[nodiscard]] std::vector<std::optional<Seen>> look(
+      const std::vector<VerifiedCandidate>& verified, std::size_t num_similar, bool is_step,
+      const IsNear& is_near) const;
+
+  /// How much one step counts: along a wrong path, it tells less the longer its deviations last.
+  [[nodiscard]] double independence() const;
+
+  /// Deviations of wrong places that follow each other, summed up; older ones fade.
+  struct Path {
+    std::ptrdiff_t step = 0;
+    double sum = 0;
+    double weight = 0;  ///< of squares, if they were independent
+  };
+
+  /// What commit() changes.
+  struct Next {
+    std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> fullest = {};
+    std::vector<Path> wrong = {};
+    double sum_sq = 0;
+    double square_sums = 0;
+  };
+
+  /// `wrong`: the deviations of steps where the robot is not, in their order.
+  [[nodiscard]] Next prepare(std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> fullest,
+                             const std::vector<std::pair<std::ptrdiff_t, double>>& wrong) const;
+
+  void commit(Next next) noexcept;
+
+ private:
+  [[nodiscard]] std::optional<Displacements::Square> expected(std::ptrdiff_t step,
+                                                              bool is_step) const;
+
+  /// The fullest square of each candidate of the latest step, and of the one before it.
+  std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> latest_;
+  std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> before_;
+  std::vector<Path> wrong_;
+  double sum_sq_ = 300;  ///< of `sum`; as if one step in three were independent
+  double square_sums_ = 100;
+};
+
+}  // namespace loopbit
