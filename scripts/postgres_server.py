@@ -78,10 +78,19 @@ def send(process, number):
     return False
 
 
+def may_make_disks():
+    """Whether this user may make a disk in memory: root may, but not in every container."""
+    with tempfile.TemporaryDirectory() as folder:
+        made = subprocess.run(["mount", "-t", "tmpfs", "tmpfs", folder], check=False, stderr=subprocess.DEVNULL)
+        if made.returncode == 0:
+            subprocess.run(["umount", folder], check=True)
+        return made.returncode == 0
+
+
 class PostgresServer:
     """A running server, whose superuser is "admin". With `safe`, commits are on disk. `extension`: the folder
     of a build with loopbit.so and what belongs to it; the server has it then. `limit_s`: for a call of sql().
-    `disk_mb`: its data are on a disk of their own, in memory, of that size; only root may make one."""
+    `disk_mb`: its data are on a disk of their own, in memory, of that size, see may_make_disks()."""
 
     def __init__(self, safe=False, extension=None, limit_s=None, disk_mb=None):
         self.limit_s = limit_s
@@ -170,7 +179,8 @@ class PostgresServer:
         def fill():
             with (self.disk / "ballast").open("wb", buffering=0) as ballast:
                 while not stop.wait(0.02):    # the server may have removed something
-                    free = os.statvfs(self.disk).f_bavail * os.statvfs(self.disk).f_frsize
+                    disk = os.statvfs(self.disk)
+                    free = disk.f_bavail * disk.f_frsize
                     with contextlib.suppress(OSError):
                         if free:
                             os.posix_fallocate(ballast.fileno(), ballast.tell(), free)

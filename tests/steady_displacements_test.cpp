@@ -49,7 +49,7 @@ std::vector<VerifiedCandidate> seen(std::ptrdiff_t step, int votes, int square,
 
 void commit(SteadyDisplacements& steady, const std::vector<VerifiedCandidate>& verified,
             const std::vector<std::pair<std::ptrdiff_t, double>>& wrong = {}) {
-  std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> fullest;
+  SteadyDisplacements::Squares fullest;
   for (const VerifiedCandidate& v : verified) fullest.emplace_back(v.step, v.votes.square);
   steady.commit(steady.prepare(std::move(fullest), wrong));
 }

@@ -399,14 +399,9 @@ void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& nex
   } else {
     next.tail.unseen += weight;
   }
-  std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> fullest;
-  fullest.reserve(update.observed.size());
-  for (const Observed& o : update.observed) fullest.emplace_back(o.step, o.square);
+  learn_steady(update, wrong, next);
   next.has_null = update.has_null;
-  if (!update.has_null) {
-    next.steady = steady_.prepare(std::move(fullest), {});
-    return;
-  }
+  if (!update.has_null) return;
   const auto deviation = [](const Observed& o) { return o.sigmas; };
   next.sigmas = largest_of_steps(wrong, deviation);
   for (const auto& [step, sigmas] : next.sigmas) {
@@ -420,10 +415,16 @@ void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& nex
     next.products += sigmas * before->second;
     next.squares += (sigmas * sigmas + before->second * before->second) / 2;
   }
-  std::erase_if(wrong, [](const Observed& o) { return !o.steady_sigmas; });
-  next.steady = steady_.prepare(std::move(fullest), largest_of_steps(wrong, [](const Observed& o) {
-                                  return o.steady_sigmas.value_or(0);
-                                }));
+}
+
+void PlaceFilter::learn_steady(const Update& update, std::vector<Observed> wrong,
+                               Next& next) const {
+  SteadyDisplacements::Squares fullest;
+  fullest.reserve(update.observed.size());
+  for (const Observed& o : update.observed) fullest.emplace_back(o.step, o.square);
+  std::erase_if(wrong, [](const Observed& o) { return !o.may_match || !o.steady_sigmas; });
+  const auto sigmas = [](const Observed& o) { return o.steady_sigmas.value_or(0); };
+  next.steady = steady_.prepare(std::move(fullest), largest_of_steps(wrong, sigmas));
 }
 
 void PlaceFilter::commit(Next next) noexcept {

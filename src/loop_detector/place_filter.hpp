@@ -153,6 +153,7 @@ class PlaceFilter {
   [[nodiscard]] double geometry_log_ratio(const CandidateGeometry& geometry,
                                           std::ptrdiff_t num_steps) const;
   void learn(const Update& update, const KnownLoops& loops, Next& next) const;
+  void learn_steady(const Update& update, std::vector<Observed> wrong, Next& next) const;
 
   Belief before_;  ///< predicted for the last step
   Belief belief_;  ///< of the last frame

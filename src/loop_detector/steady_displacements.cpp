@@ -97,8 +97,7 @@ std::vector<std::optional<SteadyDisplacements::Seen>> SteadyDisplacements::look(
 double SteadyDisplacements::independence() const { return std::min(1.0, square_sums_ / sum_sq_); }
 
 SteadyDisplacements::Next SteadyDisplacements::prepare(
-    std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> fullest,
-    const std::vector<std::pair<std::ptrdiff_t, double>>& wrong) const {
+    Squares fullest, const std::vector<std::pair<std::ptrdiff_t, double>>& wrong) const {
   Next next{.fullest = std::move(fullest)};
   for (const auto& [step, sigmas] : wrong) {
     const auto found = before(

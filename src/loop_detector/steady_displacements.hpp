@@ -23,6 +23,8 @@ class SteadyDisplacements {
     double ratio = 0;   ///< see VotesRatio, over squares up to one bin away
   };
 
+  /// The fullest square of each candidate, by step.
+  using Squares = std::vector<std::pair<std::ptrdiff_t, Displacements::Square>>;
   using IsNear = std::function<bool(std::ptrdiff_t, std::ptrdiff_t)>;
 
   /// Of each candidate. None where the step before had no candidate one or two steps away, or where
@@ -44,14 +46,14 @@ class SteadyDisplacements {
 
   /// What commit() changes.
   struct Next {
-    std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> fullest = {};
+    Squares fullest = {};
     std::vector<Path> wrong = {};
     double sum_sq = 0;
     double square_sums = 0;
   };
 
   /// `wrong`: the deviations of steps where the robot is not, in their order.
-  [[nodiscard]] Next prepare(std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> fullest,
+  [[nodiscard]] Next prepare(Squares fullest,
                              const std::vector<std::pair<std::ptrdiff_t, double>>& wrong) const;
 
   void commit(Next next) noexcept;
@@ -60,9 +62,8 @@ class SteadyDisplacements {
   [[nodiscard]] std::optional<Displacements::Square> expected(std::ptrdiff_t step,
                                                               bool is_step) const;
 
-  /// The fullest square of each candidate of the latest step, and of the one before it.
-  std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> latest_;
-  std::vector<std::pair<std::ptrdiff_t, Displacements::Square>> before_;
+  Squares latest_;  ///< of the latest step
+  Squares before_;  ///< of the one before it
   std::vector<Path> wrong_;
   double sum_sq_ = 300;  ///< of `sum`; as if one step in three were independent
   double square_sums_ = 100;
