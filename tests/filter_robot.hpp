@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -20,7 +21,8 @@ inline constexpr std::size_t kSimilar = 16;
 /// What a frame finds at some steps.
 struct Found {
   int votes = 0;
-  int inliers = -1;  ///< -1: it was not looked at closer
+  int inliers = -1;                                            ///< -1: it was not looked at closer
+  std::optional<Displacements::Square> square = std::nullopt;  ///< of the votes, if it is known
 };
 using FoundAt = std::map<std::ptrdiff_t, Found>;
 
@@ -28,6 +30,11 @@ inline VerifiedCandidate candidate(std::ptrdiff_t step, Found found) {
   VerifiedCandidate c{.candidate = {static_cast<PlaceId>(step), 0.5},
                       .step = step,
                       .votes = {.count = found.votes}};
+  if (found.square) {
+    c.votes.square = *found.square;
+    const std::vector<int> bins(static_cast<std::size_t>(found.votes), *found.square);
+    c.votes.apart = Displacements(bins);
+  }
   if (found.inliers >= 0) {
     c.geometry = CandidateGeometry{
         .matches = 100, .inliers = found.inliers, .distinct_inliers = found.inliers};

@@ -51,6 +51,22 @@ TEST(PlaceFilter, APathIsFollowedForwardBackwardAndAtTwoStepsPerStep) {
   }
 }
 
+TEST(PlaceFilter, VotesCountMoreWhereTheDisplacementIsSteady) {
+  FilterRobot steady;
+  FilterRobot jumping;
+  PlaceFilter::Update with;
+  PlaceFilter::Update without;
+  for (int i = 0; i < 6; ++i) {
+    const auto square = Displacements::moved(0, 20, 20);
+    const auto other = Displacements::moved(square, 5 * (i % 2), 0);
+    with = steady.see({{100 + i, {.votes = 10, .square = square}}});
+    without = jumping.see({{100 + i, {.votes = 10, .square = other}}});
+  }
+  EXPECT_DOUBLE_EQ(with.observed.back().sigmas, without.observed.back().sigmas);
+  EXPECT_GT(with.observed.back().votes, without.observed.back().votes + 0.5);
+  EXPECT_GT(with.probability, without.probability);
+}
+
 TEST(PlaceFilter, FramesThatJumpAreNoPath) {
   FilterRobot robot;
   for (int i = 0; i < 16; ++i) {
