@@ -101,7 +101,7 @@ def split_flags(entry):
             places.append((part,))
         elif part in ("-o", "-include"):
             next(command)
-        elif part not in ("-c", entry["file"], "-fPIC") and not part.startswith(("-fvisibility", "-O")):
+        elif part not in ("-c", entry["file"], "-fPIC") and not part.startswith(("-fvisibility", "-O", "--param")):
             others.append(part)
     return places, tuple(others)
 
