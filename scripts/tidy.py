@@ -37,7 +37,7 @@ QUICK = ["--checks=-clang-analyzer-*,-performance-unnecessary-value-param,-bugpr
          "-bugprone-unused-raii,-bugprone-sizeof-expression,-bugprone-not-null-terminated-result,"
          "-readability-redundant-declaration,-readability-static-definition-in-anonymous-namespace"]
 # A source includes no other, but a batch does; and may shadow names of another, for which compilers check each target.
-BATCHED = ["--checks=" + QUICK[0].split("=")[1] + ",-bugprone-suspicious-include,-clang-diagnostic-shadow"]
+BATCHED = ["--checks=" + QUICK[0].split("=")[1] + ",-bugprone-suspicious-include", "--extra-arg=-Wno-shadow"]
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 
 
