@@ -111,7 +111,7 @@ class LoopDetector::Impl {
         odometry_(options.odometry),
         paths_(odometry_, shortcuts_, Reach::views_sq(options.decision)),
         memory_(std::move(map)),
-        index_(memory_),
+        contents_(memory_),
         filter_({[this](PlaceId place) { return origin(place); },
                  [this](const SessionFrame& at) { return find(at); },
                  [this](PlaceId place) { return spot_of(place); }}),
@@ -127,8 +127,8 @@ class LoopDetector::Impl {
     for (const auto& [at, content] : news.places) {
       const auto latest = memory_.latest_step(at.session);
       const bool is_step =
-          !latest || changes_view(content, quick_similarity(content, content_of(*latest)));
-      new_index_.add(content);
+          !latest || changes_view(content, quick_similarity(content, contents_.content(*latest)));
+      contents_.add_new(content);
       memory_.add_new(at, is_step);
     }
     const auto with_steps = [this](const MapNews::Loop& loop, const auto& use) {
@@ -283,13 +283,13 @@ class LoopDetector::Impl {
     KnownLoops found;
     std::optional<Shortcuts::Next> shortcuts;
     if (detection.status == Status::loop) {
-      const std::ptrdiff_t latest = recent_view_.step_of(index_.size());
+      const std::ptrdiff_t latest = recent_view_.step_of(contents_.size());
       found.add(seen.look.is_step ? latest + 1 : latest, seen.best->step);
       shortcuts = shortcuts_with(detection, seen);
     }
     LateLoops::Next frame;
     if (!options_.decision.count_matches) {
-      frame = LateLoops::prepare(seen.update, index_.size(), detection.status == Status::loop,
+      frame = LateLoops::prepare(seen.update, contents_.size(), detection.status == Status::loop,
                                  known_loops_);
     }
     PlaceFilter::Next next =
@@ -377,7 +377,7 @@ class LoopDetector::Impl {
     shortcuts_.remove(query.frame);
     place_filter_.withdraw(step_of(*wrong), known_loops_);
     late_loops_.reject(*place, step_of(*wrong), known_loops_);
-    if (step_of(index_.size() - 1) == step_of(*place)) filter_.reject(*wrong);
+    if (step_of(contents_.size() - 1) == step_of(*place)) filter_.reject(*wrong);
   }
 
   /// See LoopDetector::features_of.
@@ -390,7 +390,7 @@ class LoopDetector::Impl {
   }
 
   /// Frames of this session.
-  [[nodiscard]] PlaceId size() const { return index_.size() - memory_.session_begin(); }
+  [[nodiscard]] PlaceId size() const { return contents_.size() - memory_.session_begin(); }
   [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
 
  private:
@@ -406,10 +406,10 @@ class LoopDetector::Impl {
     if (memory_.is_searched()) return memory_.restore_searched(kUnmovedSimilarity);
     PlaceId latest_step = 0;
     memory_.restore([&](const BinaryContent& content) {
-      const PlaceId place = index_.add(content);
+      const PlaceId place = contents_.add(content);
       const bool is_step =
           place == 0 ||
-          changes_view(content, quick_similarity(content, index_.content(latest_step)));
+          changes_view(content, quick_similarity(content, contents_.content(latest_step)));
       if (is_step) latest_step = place;
       return is_step;
     });
@@ -495,7 +495,7 @@ class LoopDetector::Impl {
   /// All of it or, where it throws, nothing.
   PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection,
                     const cv::Mat& image) {
-    index_.reserve_next();
+    contents_.reserve_next();
     odometry_.reserve_next();
     // The time of a frame that nothing matches may be wrong, and would shut out those after it.
     const double last_s =
@@ -509,7 +509,7 @@ class LoopDetector::Impl {
       throw;
     }
     odometry_.add(detection.odometry);
-    return index_.add(content);
+    return contents_.add(content);
   }
 
   [[nodiscard]] CandidateVerifier::Query verified_query(const Observation& seen) const {
@@ -532,8 +532,8 @@ class LoopDetector::Impl {
     const bool is_step =
         recent_view_.empty() ||
         changes_view(seen.content,
-                     similarity(seen.content, index_.content(recent_view_.latest_step())));
-    return recent_view_.look(index_.size(), is_step, [&](PlaceId place) {
+                     similarity(seen.content, contents_.content(recent_view_.latest_step())));
+    return recent_view_.look(contents_.size(), is_step, [&](PlaceId place) {
       if (is_window_fixed()) return true;
       const Verification& shared = compare(seen, place);
       return moved_inliers(seen.features, features(place, seen), shared.inliers) >=
@@ -569,13 +569,14 @@ class LoopDetector::Impl {
                                            std::optional<double> timestamp_s) const {
     const ExclusionOptions& exclusion = options_.exclusion;
     PlaceId first = look.begin;
-    if (exclusion.frames > 0) first = index_.size() - exclusion.frames;
+    if (exclusion.frames > 0) first = contents_.size() - exclusion.frames;
     if (exclusion.seconds > 0) {
       const auto recent =
           std::upper_bound(times_s_.begin(), times_s_.end(), *timestamp_s - exclusion.seconds);
       first = memory_.session_begin() + static_cast<PlaceId>(recent - times_s_.begin());
     }
-    return std::max(memory_.session_begin(), std::min(first, index_.size() - exclusion.min_frames));
+    return std::max(memory_.session_begin(),
+                    std::min(first, contents_.size() - exclusion.min_frames));
   }
 
   /// See RankedPlace::score.
@@ -585,31 +586,8 @@ class LoopDetector::Impl {
   }
 
   [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const {
-    return {place,
-            similarity(content, content_of(place), options_.retrieval.shift_tolerance_columns)};
-  }
-
-  [[nodiscard]] BinaryContent content_of(PlaceId place) const {
-    return place < 0 ? new_index_.content(-1 - place) : index_.content(place);
-  }
-
-  /// The places most similar to a content, best first; of equal ones, those of news() come last.
-  /// `end`: of the others.
-  [[nodiscard]] std::vector<Candidate> find_similar(const BinaryContent& content, PlaceId end,
-                                                    const RetrievalOptions& retrieval,
-                                                    const PlaceTest& is_allowed) const {
-    auto similar = index_.query(content, end, retrieval, is_allowed);
-    if (new_index_.size() == 0) return similar;
-    PlaceTest is_new_allowed;
-    if (is_allowed) is_new_allowed = [&](PlaceId place) { return is_allowed(-1 - place); };
-    for (const auto& [place, value] :
-         new_index_.query(content, new_index_.size(), retrieval, nullptr, is_new_allowed)) {
-      similar.push_back({-1 - place, value});
-    }
-    std::ranges::stable_sort(similar, std::greater{}, &Candidate::similarity);
-    const auto most = static_cast<std::size_t>(retrieval.max_candidates);
-    similar.resize(std::min(most, similar.size()));
-    return similar;
+    return {place, similarity(content, contents_.content(place),
+                              options_.retrieval.shift_tolerance_columns)};
   }
 
   /// The first place of a step.
@@ -637,7 +615,7 @@ class LoopDetector::Impl {
                                         Observation& seen) const {
     RetrievalOptions retrieval = options_.retrieval;
     if (detection.odometry) retrieval.max_candidates *= kLookAlikes;
-    auto similar = find_similar(seen.content, end, retrieval, seen.is_allowed);
+    auto similar = contents_.query(seen.content, end, retrieval, seen.is_allowed);
     if (!detection.odometry) return similar;
     keep_in_reach(*detection.odometry, end, seen);
     const auto most = static_cast<std::size_t>(options_.retrieval.max_candidates);
@@ -708,12 +686,10 @@ class LoopDetector::Impl {
               Detection& detection) const {
     const DecisionOptions& decision = options_.decision;
     if (std::ranges::none_of(seen.verified, &VerifiedCandidate::may_match)) {
-      const bool has_places = end > 0 || new_index_.size() > 0;
-      detection.status = has_places ? Status::no_similar_place : Status::no_earlier_place;
-    } else if (decision.count_matches) {
-      decide_by_matches(seen, detection);
+      detection.status =
+          contents_.any_before(end) ? Status::no_similar_place : Status::no_earlier_place;
     }
-    if (decision.count_matches) return;
+    if (decision.count_matches) return decide_by_matches(seen, detection);
     const PlaceFilter::Steps steps{
         .number = steps_before(end),
         .may_be_at =
@@ -807,10 +783,11 @@ class LoopDetector::Impl {
 
   /// As in the paper.
   void decide_by_matches(Observation& seen, Detection& detection) const {
-    const auto& best = *std::ranges::max_element(seen.verified, {}, [&](const auto& v) {
+    const auto best = std::ranges::max_element(seen.verified, {}, [&](const auto& v) {
       return std::tuple(v.may_match, score(v, seen), v.candidate.similarity);
     });
-    report_match(best, seen, detection);
+    if (best == seen.verified.end() || !best->may_match) return;
+    report_match(*best, seen, detection);
     detection.score = score(*seen.best, seen);
     detection.status = detection.score >= options_.decision.min_score
                            ? Status::loop
@@ -835,8 +812,7 @@ class LoopDetector::Impl {
   BinaryContent excluded_;     ///< by the mask
   std::optional<CameraModel> camera_;
   PlaceMemory memory_;
-  PlaceContents index_;
-  PlaceIndex new_index_;         ///< of place -1 - k at k
+  PlaceContents contents_;
   std::int64_t epoch_ = 0;       ///< see Detection::epoch
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   RecentView recent_view_;

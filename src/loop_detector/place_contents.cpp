@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <functional>
 
 namespace loopbit {
 namespace {
@@ -16,13 +17,30 @@ bool is_far_from(const std::vector<Candidate>& taken, PlaceId place, int spacing
 
 }  // namespace
 
-/// Takes the most similar places in order, as PlaceIndex does. A place that is taken keeps at most
-/// 2 * (min_spacing - 1) others out. So there are enough if all may be taken; otherwise more are
-/// asked for.
 std::vector<Candidate> PlaceContents::query(const BinaryContent& content, PlaceId end,
                                             const RetrievalOptions& options,
                                             const PlaceTest& is_allowed) const {
-  if (!memory_.is_searched()) return index_.query(content, end, options, nullptr, is_allowed);
+  auto similar = memory_.is_searched() ? query_map(content, end, options, is_allowed)
+                                       : index_.query(content, end, options, nullptr, is_allowed);
+  if (new_index_.size() == 0) return similar;
+  PlaceTest is_new_allowed;
+  if (is_allowed) is_new_allowed = [&](PlaceId place) { return is_allowed(-1 - place); };
+  for (const auto& [place, value] :
+       new_index_.query(content, new_index_.size(), options, nullptr, is_new_allowed)) {
+    similar.push_back({-1 - place, value});
+  }
+  std::ranges::stable_sort(similar, std::greater{}, &Candidate::similarity);
+  const auto most = static_cast<std::size_t>(options.max_candidates);
+  similar.resize(std::min(most, similar.size()));
+  return similar;
+}
+
+/// Takes the most similar places in order, as PlaceIndex does. A place that is taken keeps at most
+/// 2 * (min_spacing - 1) others out. So there are enough if all may be taken; otherwise more are
+/// asked for.
+std::vector<Candidate> PlaceContents::query_map(const BinaryContent& content, PlaceId end,
+                                                const RetrievalOptions& options,
+                                                const PlaceTest& is_allowed) const {
   validate(options, "retrieval");
   if (count(content) == 0) return {};
   const cv::Point2d query_center = center(content);
