@@ -111,13 +111,18 @@ class Runner:
                 flags += [flag, self.data / file]
         return flags
 
-    def sequences(self):
-        """Yields a name and the command that runs it with its truth."""
+    def real(self):
+        """Yields the names of the real sequences that are there, and names the others."""
         for name, (images, *_) in REAL.items():
             if (self.data / images).exists():
-                yield name, ["run", self.data / images, *self.truth_flags(name)]
+                yield name
             else:
                 print(f"{name}: left out, there is no {self.data / images}", file=sys.stderr)
+
+    def sequences(self):
+        """Yields a name and the command that runs it with its truth."""
+        for name in self.real():
+            yield name, ["run", self.data / REAL[name][0], *self.truth_flags(name)]
         for name, settings in WORLDS.items():
             yield name, world_command(settings)
 
