@@ -6,8 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
-#include <functional>
 #include <limits>
 #include <span>
 #include <tuple>
