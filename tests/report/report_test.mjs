@@ -144,7 +144,7 @@ async function checkReport(
   await run("numbers", (page) => checkNumbers(page, runJson));
   await run("pairs", async (page) => `${await checkPairs(page, isBrief)} times xi compared`);
   await run("clicks, hovering, zoom", (page) => checkViews(page, isBrief));
-  await run("filters and arrow keys", checkFilters);
+  await run("filters and arrow keys", (page) => checkFilters(page, isBrief));
   await run("true place", checkTruePlace);
   await run("search", checkSearch);
   await run("revisits", checkRevisits);
