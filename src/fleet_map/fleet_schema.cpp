@@ -21,7 +21,7 @@ BEGIN
 END
 $$)";
 
-/// docs/fleet.md explains the columns that a map file does not have. The limits are those that the
+/// docs/format.md explains the columns that a map file does not have. The limits are those that the
 /// readers of a map have, too.
 constexpr const char* kTables = R"(
 CREATE SCHEMA loopbit;

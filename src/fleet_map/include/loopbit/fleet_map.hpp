@@ -5,7 +5,7 @@
 namespace loopbit {
 
 /// From now on, "postgresql://..." is a map on a PostgreSQL server wherever a map's path is
-/// expected. docs/fleet.md describes its tables and roles.
+/// expected. docs/format.md describes its tables, docs/fleet.md its roles.
 void use_fleet_maps();
 
 }  // namespace loopbit
