@@ -109,6 +109,25 @@ export async function goTo(page, frame) {
 export const shownFrame = (page) =>
   page.evaluate(() => Number(document.getElementById("frame-number").value));
 
+/** The selected frame after each of `keys`. If `isAtOnce`, nothing is drawn in between. */
+export async function framesAfter(page, keys, isAtOnce) {
+  if (isAtOnce) {
+    return page.evaluate((all) => {
+      const field = document.getElementById("frame-number");
+      return all.map((key) => {
+        dispatchEvent(new KeyboardEvent("keydown", { key }));
+        return Number(field.value);
+      });
+    }, keys);
+  }
+  const frames = [];
+  for (const key of keys) {
+    await page.keyboard.press(key);
+    frames.push(await shownFrame(page));
+  }
+  return frames;
+}
+
 /** Name and value of the address after '#'. */
 export const address = async (page) =>
   Object.fromEntries(new URLSearchParams(new URL(page.url()).hash.slice(1)));

@@ -7,6 +7,7 @@ import {
   assertShows,
   drawn,
   embedded,
+  framesAfter,
   goTo,
   isMissed,
   kWide,
@@ -24,28 +25,9 @@ const framesWith = (run, filter) =>
     return isIn ? [i] : [];
   });
 
-/** The selected frame after each of `keys`. If `isAtOnce`, nothing is drawn in between. */
-async function framesAfter(page, keys, isAtOnce) {
-  if (isAtOnce) {
-    return page.evaluate((all) => {
-      const field = document.getElementById("frame-number");
-      return all.map((key) => {
-        dispatchEvent(new KeyboardEvent("keydown", { key }));
-        return Number(field.value);
-      });
-    }, keys);
-  }
-  const frames = [];
-  for (const key of keys) {
-    await page.keyboard.press(key);
-    frames.push(await shownFrame(page));
-  }
-  return frames;
-}
-
 /**
  * Arrow keys, Home and End walk exactly the frames that the filter lets through. `isBrief`: the page
- * gets the keys all at once, for drawing every frame takes most of the time.
+ * gets the keys all at once, because drawing every frame takes most of the time.
  */
 export async function checkFilters(page, isBrief) {
   const run = (await embedded(page)).runs[0];

@@ -4,7 +4,16 @@
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
 import path from "node:path";
-import { address, embedded, goTo, kWide, settled, shownFrame, textOf } from "./browser.mjs";
+import {
+  address,
+  embedded,
+  framesAfter,
+  goTo,
+  kWide,
+  settled,
+  shownFrame,
+  textOf,
+} from "./browser.mjs";
 
 const isLoop = (run, frame) => run.status_names[run.status[frame]] === "loop";
 
@@ -48,11 +57,8 @@ export async function checkWeakest(page) {
   loops.sort((a, b) => run.score[a] - run.score[b] || a - b);
   const button = page.locator("#pair button", { hasText: "weakest first" });
   await button.click();
-  const walked = [await shownFrame(page)];
-  for (let i = 1; i < 3; ++i) {
-    await page.keyboard.press("ArrowRight");
-    walked.push(await shownFrame(page));
-  }
+  const first = await shownFrame(page);
+  const walked = [first, ...(await framesAfter(page, ["ArrowRight", "ArrowRight"]))];
   assert.deepEqual(walked, loops.slice(0, 3), "the weakest loops");
   assert.equal((await address(page)).order, "weakest");
   await button.click();
