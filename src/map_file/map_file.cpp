@@ -195,12 +195,15 @@ void MapReader::set_epoch(std::int64_t epoch) {
     impl_->epoch = epoch;
     return;
   }
-  throw Error(ErrorKind::option,
-              last == 0 ? fmt::format("'{}' has no epochs, as a map on a server has; leave the "
-                                      "epoch out.",
-                                      impl_->path)
-                        : fmt::format("The epochs of '{}' are 1 to {}; {} is none of them.",
-                                      impl_->path, last, epoch));
+  const std::string& path = impl_->path;
+  if (last > 0) {
+    throw Error(
+        ErrorKind::option,
+        fmt::format("The epochs of '{}' are 1 to {}; {} is none of them.", path, last, epoch));
+  }
+  throw Error(ErrorKind::option, fmt::format("'{}' has no epochs{}; leave the epoch out.", path,
+                                             is_map_address(path) ? " yet, since it is empty"
+                                                                  : ", as a map on a server has"));
 }
 
 std::int64_t MapReader::epoch() { return impl_->epoch; }
