@@ -13,19 +13,15 @@
 namespace loopbit {
 namespace {
 
-int overlap(const BinaryContent& a, const BinaryContent& b) {
-  int set = 0;
-  for (std::size_t y = 0; y < a.rows.size(); ++y) set += std::popcount(a.rows[y] & b.rows[y]);
-  return set;
+int overlap(std::span<const BinaryContent> queries, const BinaryContent& place) {
+  std::uint16_t most = 0;
+  max_overlaps(queries, std::span(&place, 1), std::span(&most, 1));
+  return most;
 }
 
 }  // namespace
 
-int count(const BinaryContent& content) {
-  int set = 0;
-  for (const std::uint64_t row : content.rows) set += std::popcount(row);
-  return set;
-}
+int count(const BinaryContent& content) { return overlap(std::span(&content, 1), content); }
 
 cv::Point2d center(const BinaryContent& content) {
   std::int64_t sum_x = 0;
@@ -63,11 +59,7 @@ std::vector<BinaryContent> tolerated_shifts(const BinaryContent& content, int to
 double similarity(const BinaryContent& a, const BinaryContent& b, int shift_tolerance_columns) {
   const int larger = std::max(count(a), count(b));
   if (larger == 0) return 0.0;
-  int best = 0;
-  for (const BinaryContent& shifted : tolerated_shifts(a, shift_tolerance_columns)) {
-    best = std::max(best, overlap(shifted, b));
-  }
-  return static_cast<double>(best) / larger;
+  return static_cast<double>(overlap(tolerated_shifts(a, shift_tolerance_columns), b)) / larger;
 }
 
 void max_overlaps(std::span<const BinaryContent> queries, std::span<const BinaryContent> places,

@@ -2,16 +2,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
-#include <functional>
-#include <optional>
-#include <utility>
 #include <vector>
 
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/place_index.hpp"
 
 #include "distinctness.hpp"
+#include "places.hpp"
 
 namespace loopbit {
 
@@ -19,14 +16,8 @@ namespace loopbit {
 /// view led to, and none that the caller leaves out.
 class CandidateFilter {
  public:
-  /// What is known of places.
-  struct Places {
-    std::function<SessionFrame(PlaceId)> origin;  ///< see AllowedPlaces
-    std::function<std::optional<PlaceId>(const SessionFrame&)> find;
-    std::function<Spot(PlaceId)> spot_of;
-  };
-
-  explicit CandidateFilter(Places places) : places_(std::move(places)) {}
+  /// Keeps the reference.
+  explicit CandidateFilter(const Places& places) : places_(places) {}
 
   void remove(PlaceId place);
 
@@ -45,7 +36,7 @@ class CandidateFilter {
   [[nodiscard]] PlaceTest wanted(const AllowedPlaces& allowed) const;
   [[nodiscard]] bool is_rejected(PlaceId place) const;
 
-  Places places_;
+  const Places& places_;
   std::vector<bool> removed_;   ///< by place; those beyond are not
   std::vector<Spot> rejected_;  ///< where the present view is not
 };

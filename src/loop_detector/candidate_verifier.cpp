@@ -64,11 +64,11 @@ struct CandidateVerifier::Frame {
   }
 };
 
-CandidateVerifier::CandidateVerifier(const LoopDetectorOptions& options, Places places,
-                                     const KnownLoops& known_loops)
+CandidateVerifier::CandidateVerifier(const LoopDetectorOptions& options, const Places& places,
+                                     PlaceMemory::Held& held)
     : options_(options),
-      places_(std::move(places)),
-      known_loops_(known_loops),
+      places_(places),
+      held_(held),
       verifier_(options.verification),
       thorough_verifier_(thorough(options.verification)),
       votes_(options.verification.min_spacing_scales) {}
@@ -106,7 +106,7 @@ void CandidateVerifier::look(Frame& frame) {
   const Features& query = frame.query.features;
   Verifier& verifier = frame.query.closely ? thorough_verifier_ : verifier_;
   const auto place = [&](std::size_t i) -> const Features& {
-    return places_.features(frame.verified[i].candidate.place);
+    return places_.features(frame.verified[i].candidate.place, held_);
   };
   const std::span looks = std::span(looks_).first(frame.verified.size());
   for (std::size_t i = 0; i < looks.size(); ++i) {
@@ -143,8 +143,8 @@ void CandidateVerifier::look_at_others(Frame& frame) {
     const VerifiedCandidate& v = frame.verified[i];
     if (!v.may_match || v.geometry || !is_elsewhere(frame, v)) continue;
     if (!frame.may_share(looks_[i].matches)) continue;
-    verifier_.match_some(frame.query.features, frame.features, places_.features(v.candidate.place),
-                         verification_);
+    verifier_.match_some(frame.query.features, frame.features,
+                         places_.features(v.candidate.place, held_), verification_);
     if (verification_.matches.size() >= kMinSharedMatches) verify_in_full(frame, i, true);
   }
 }
@@ -163,7 +163,7 @@ std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& que
                                                                 const FirstLook& look,
                                                                 Verification& result,
                                                                 bool even_if_chance) {
-  const Features& features = places_.features(place);
+  const Features& features = places_.features(place, held_);
   verifier_.match(query.features, features, look, result);
   CandidateGeometry geometry{
       .matches = static_cast<int>(result.matches.size()),
@@ -179,7 +179,7 @@ std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& que
 }
 
 Spot CandidateVerifier::spot_of(const VerifiedCandidate& candidate) const {
-  return {candidate.step, known_loops_.first_visit(candidate.step)};
+  return places_.spot_of(candidate.candidate.place);
 }
 
 /// Whether it shows another place than each promising candidate, for all we know.

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -13,7 +12,7 @@
 
 #include "displacement_votes.hpp"
 #include "distinctness.hpp"
-#include "known_loops.hpp"
+#include "places.hpp"
 
 namespace loopbit {
 
@@ -37,7 +36,7 @@ struct CandidateGeometry {
 /// One candidate of one frame.
 struct VerifiedCandidate {
   Candidate candidate;
-  std::ptrdiff_t step = 0;  ///< the candidate's position along the path, see RecentView::step_of
+  std::ptrdiff_t step = 0;  ///< the candidate's, see Places
   bool may_match = true;    ///< false: it only shows what wrong places have
   Votes votes = {};
   std::optional<CandidateGeometry> geometry = std::nullopt;  ///< if it may be more than chance
@@ -62,15 +61,9 @@ class CandidateVerifier {
     PlaceTest may_match = {};             ///< empty = all may; the others are only looked at once
   };
 
-  /// What is known of places.
-  struct Places {
-    std::function<const Features&(PlaceId)> features;
-    std::function<std::ptrdiff_t(PlaceId)> step_of;  ///< see VerifiedCandidate::step
-  };
-
-  /// Keeps the references.
-  CandidateVerifier(const LoopDetectorOptions& options, Places places,
-                    const KnownLoops& known_loops);
+  /// Keeps the references. `held` takes the features that it reads from a map.
+  CandidateVerifier(const LoopDetectorOptions& options, const Places& places,
+                    PlaceMemory::Held& held);
 
   /// The candidates, in their order. The first `num_similar` look most alike, the others are where
   /// the robot is expected; the best few of both are looked at closer.
@@ -97,8 +90,8 @@ class CandidateVerifier {
   void find_distinctness(Frame& frame) const;
 
   const LoopDetectorOptions& options_;
-  Places places_;
-  const KnownLoops& known_loops_;
+  const Places& places_;
+  PlaceMemory::Held& held_;
   Verifier verifier_;
   Verifier thorough_verifier_;  ///< its first look matches all keypoints
   DisplacementVotes votes_;

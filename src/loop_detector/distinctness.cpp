@@ -12,7 +12,7 @@ namespace {
 constexpr std::ptrdiff_t kSamePlaceSteps = 6;
 
 /// In how many other places a feature of the query was found.
-struct Places {
+struct Elsewhere {
   int count = 0;
   int latest = 0;  ///< the number of the last one, from 1
 };
@@ -26,7 +26,7 @@ bool is_same_place(const Spot& a, const Spot& b) {
 
 double distinctness(const Sighting& sighting, const std::vector<Sighting>& all) {
   if (sighting.inliers.empty()) return 1;
-  std::vector<Places> found;
+  std::vector<Elsewhere> found;
   int place = 0;
   std::ptrdiff_t latest_visit = std::numeric_limits<std::ptrdiff_t>::min() / 2;
   for (const Sighting& other : all) {

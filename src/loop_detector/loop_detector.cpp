@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdint>
 #include <limits>
-#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -19,21 +17,15 @@
 
 #include "attached_parts.hpp"
 #include "candidate_filter.hpp"
-#include "known_loops.hpp"
 #include "late_loops.hpp"
-#include "place_contents.hpp"
 #include "place_filter.hpp"
-#include "place_memory.hpp"
+#include "places.hpp"
 #include "reach.hpp"
-#include "recent_view.hpp"
 #include "shortcuts.hpp"
 #include "workspace.hpp"
 
 namespace loopbit {
 namespace {
-
-/// Two frames this alike show the same view: the camera has hardly moved in between.
-constexpr double kUnmovedSimilarity = 0.8;
 
 class Stopwatch {
  public:
@@ -60,6 +52,11 @@ constexpr int kLookAlikes = 10;
 /// probability, so that most new places cost little.
 constexpr double kWorthACloserLook = 0.1;
 
+LoopDetectorOptions validated(const LoopDetectorOptions& options) {
+  validate(options);
+  return options;
+}
+
 Status reason_of_rejection(const CandidateGeometry& best, const VerificationOptions& options) {
   if (best.matches < options.min_matches) return Status::few_matches;
   return best.inliers == 0 ? Status::no_geometry : Status::low_score;
@@ -76,23 +73,6 @@ int moved_inliers(const Features& query, const Features& place, const std::vecto
   }));
 }
 
-/// similarity(a, b) by max_overlaps(): a map may have a million places to compare.
-double quick_similarity(const BinaryContent& a, const BinaryContent& b) {
-  const auto overlap = [](const BinaryContent& x, const BinaryContent& y) {
-    std::uint16_t pixels = 0;
-    max_overlaps(std::span(&x, 1), std::span(&y, 1), std::span(&pixels, 1));
-    return pixels;
-  };
-  const int larger = std::max(overlap(a, a), overlap(b, b));
-  return larger == 0 ? 0.0 : static_cast<double>(overlap(a, b)) / larger;
-}
-
-/// Whether a content shows another view than the latest change of view did, from their similarity.
-/// One without pixels, of a dark or covered camera, says nothing of the view.
-bool changes_view(const BinaryContent& content, double similarity) {
-  return similarity < kUnmovedSimilarity && count(content) > 0;
-}
-
 /// Of a keypoint in its image, 0 to 1.
 cv::Point2f relative_position(const Features& features, int index) {
   const Keypoint& keypoint = features.keypoints[static_cast<std::size_t>(index)];
@@ -105,43 +85,15 @@ cv::Point2f relative_position(const Features& features, int index) {
 class LoopDetector::Impl {
  public:
   Impl(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
-      : options_(options),
+      : options_(validated(options)),
         odometry_(options.odometry),
         paths_(odometry_, shortcuts_, Reach::views_sq(options.decision)),
-        memory_(std::move(map)),
-        contents_(memory_),
-        filter_({[this](PlaceId place) { return origin(place); },
-                 [this](const SessionFrame& at) { return find(at); },
-                 [this](PlaceId place) { return spot_of(place); }}),
-        workspaces_([this] { return make_workspace(); }) {
-    validate(options);
-    memory_.check_options(options);
-    restore();
-  }
+        places_(options_, std::move(map)),
+        filter_(places_),
+        workspaces_([this] { return std::make_unique<Workspace>(options_, places_); }) {}
 
   /// Takes in what other robots added to the map. Call it before a frame.
-  void learn() {
-    const MapNews news = memory_.news();
-    for (const auto& [at, content] : news.places) {
-      const auto latest = memory_.latest_step(at.session);
-      const bool is_step =
-          !latest || changes_view(content, quick_similarity(content, contents_.content(*latest)));
-      contents_.add_new(content);
-      memory_.add_new(at, is_step);
-    }
-    const auto with_steps = [this](const MapNews::Loop& loop, const auto& use) {
-      const auto place = find(loop.query);
-      const auto match = find(loop.match);
-      if (place && match) use(step_of(*place), step_of(*match));
-    };
-    for (const MapNews::Loop& loop : news.loops) {
-      with_steps(loop, [this](auto step, auto match) { known_loops_.add(step, match); });
-    }
-    for (const MapNews::Loop& loop : news.rejected) {
-      with_steps(loop, [this](auto step, auto match) { known_loops_.remove(step, match); });
-    }
-    epoch_ = std::max(epoch_, news.epoch);
-  }
+  void learn() { places_.learn(); }
 
   /// What comes with an image.
   struct Given {
@@ -264,7 +216,7 @@ class LoopDetector::Impl {
     std::vector<RankedPlace> places;
     places.reserve(seen.verified.size());
     for (const VerifiedCandidate& v : seen.verified) {
-      places.push_back({.place = origin(v.candidate.place),
+      places.push_back({.place = places_.origin(v.candidate.place),
                         .score = score(v, seen),
                         .similarity = v.candidate.similarity,
                         .matches = v.geometry->matches,
@@ -276,37 +228,34 @@ class LoopDetector::Impl {
 
   /// All of it or, where it throws, nothing: what needs memory comes first.
   void remember(Observation seen, const Detection& detection, const cv::Mat& image) {
-    recent_view_.reserve_next();
     attached_parts_.reserve_next(seen.features.working_size_px);
     KnownLoops found;
     std::optional<Shortcuts::Next> shortcuts;
     if (detection.status == Status::loop) {
-      const std::ptrdiff_t latest = recent_view_.step_of(contents_.size());
+      const std::ptrdiff_t latest = places_.step_of(places_.size());
       found.add(seen.look.is_step ? latest + 1 : latest, seen.best->step);
       shortcuts = shortcuts_with(detection, seen);
     }
     LateLoops::Next frame;
     if (!options_.decision.count_matches) {
-      frame = LateLoops::prepare(seen.update, contents_.size(), detection.status == Status::loop,
-                                 known_loops_);
+      frame = LateLoops::prepare(seen.update, places_.size(), detection.status == Status::loop,
+                                 places_.known_loops());
     }
     PlaceFilter::Next next =
-        place_filter_.prepare(std::move(seen.update), seen.look.is_step, known_loops_);
+        place_filter_.prepare(std::move(seen.update), seen.look.is_step, places_.known_loops());
     const cv::Size working_size_px = seen.features.working_size_px;
-    const PlaceId place = add_place(seen.content, std::move(seen.features), detection, image);
-    recent_view_.remember(place, seen.look);
+    add_place(seen.content, std::move(seen.features), seen.look, detection, image);
     if (seen.look.is_step) filter_.note_change_of_view();
-    memory_.leave_behind([&](PlaceId removed) { return recent_view_.is_in_view(removed); });
     attached_parts_.remember(working_size_px, seen.all_keypoints);
     latest_view_inliers_ = seen.view_inliers;
-    known_loops_.take(found);
+    places_.known_loops().take(found);
     if (shortcuts) shortcuts_.commit(std::move(*shortcuts));
     place_filter_.commit(std::move(next));
     if (frame.empty()) return;
     late_loops_.commit(std::move(frame), seen.look.is_step, seen.changed);
     for (const LateLoops::Loop& loop : seen.changed.withdrawn) {
-      known_loops_.remove(step_of(loop.frame), loop.matched_step);
-      shortcuts_.remove(loop.frame - memory_.session_begin());
+      places_.known_loops().remove(places_.step_of(loop.frame), loop.matched_step);
+      shortcuts_.remove(loop.frame - places_.session_begin());
     }
   }
 
@@ -317,8 +266,8 @@ class LoopDetector::Impl {
                         .timestamp_s = given.timestamp_s,
                         .status = Status::unreadable,
                         .odometry = given.odometry,
-                        .epoch = epoch_};
-    add_place(BinaryContent{}, Features{}, detection, cv::Mat());
+                        .epoch = places_.epoch()};
+    add_place(BinaryContent{}, Features{}, std::nullopt, detection, cv::Mat());
     return detection;
   }
 
@@ -354,85 +303,48 @@ class LoopDetector::Impl {
 
   /// See LoopDetector::remove.
   void remove(const SessionFrame& at) {
-    const auto place = find(at);
+    const auto place = places_.find(at);
     if (!place) throw missing(at);
     if (filter_.is_removed(*place)) return;
-    memory_.remove(*place, recent_view_.is_in_view(*place));
+    places_.remove(*place);
     filter_.remove(*place);
     late_loops_.remove(*place);
   }
 
   /// See LoopDetector::reject. The map may have loops of places that are gone.
   void reject(const SessionFrame& query, const SessionFrame& match) {
-    const auto place = find(query);
-    const auto wrong = find(match);
+    const auto place = places_.find(query);
+    const auto wrong = places_.find(match);
     if (!place && query.session == 0) throw missing(query);
     if (!wrong && match.session == 0) throw missing(match);
-    memory_.reject(query, match);
+    places_.reject(query, match);
     if (!place || !wrong) return;
-    known_loops_.remove(step_of(*place), step_of(*wrong));
-    if (*place < memory_.session_begin()) return;
+    const std::ptrdiff_t step = places_.step_of(*place);
+    const std::ptrdiff_t wrong_step = places_.step_of(*wrong);
+    places_.known_loops().remove(step, wrong_step);
+    if (*place < places_.session_begin()) return;
     shortcuts_.remove(query.frame);
-    place_filter_.withdraw(step_of(*wrong), known_loops_);
-    late_loops_.reject(*place, step_of(*wrong), known_loops_);
-    if (step_of(contents_.size() - 1) == step_of(*place)) filter_.reject(*wrong);
+    place_filter_.withdraw(wrong_step, places_.known_loops());
+    late_loops_.reject(*place, wrong_step, places_.known_loops());
+    if (places_.step_of(places_.size() - 1) == step) filter_.reject(*wrong);
   }
 
   /// See LoopDetector::features_of.
   [[nodiscard]] Features features_of(const SessionFrame& at) const {
-    const auto place = find(at);
+    const auto place = places_.find(at);
     if (!place) throw missing(at);
     if (filter_.is_removed(*place)) return {};
     PlaceMemory::Held held;
-    return memory_.features(*place, held);
+    return places_.features(*place, held);
   }
 
   /// Frames of this session.
-  [[nodiscard]] PlaceId size() const { return contents_.size() - memory_.session_begin(); }
+  [[nodiscard]] PlaceId size() const { return places_.size() - places_.session_begin(); }
   [[nodiscard]] const LoopDetectorOptions& options() const { return options_; }
 
  private:
-  void restore() {
-    restore_places();
-    memory_.restore_loops([&](std::ptrdiff_t step, std::ptrdiff_t earlier_step) {
-      known_loops_.add(step, earlier_step);
-    });
-    epoch_ = memory_.epoch();
-  }
-
-  void restore_places() {
-    if (memory_.is_searched()) return memory_.restore_searched(kUnmovedSimilarity);
-    PlaceId latest_step = 0;
-    memory_.restore([&](const BinaryContent& content) {
-      const PlaceId place = contents_.add(content);
-      const bool is_step =
-          place == 0 ||
-          changes_view(content, quick_similarity(content, contents_.content(latest_step)));
-      if (is_step) latest_step = place;
-      return is_step;
-    });
-  }
-
-  [[nodiscard]] std::unique_ptr<Workspace> make_workspace() const {
-    return std::make_unique<Workspace>(
-        options_, memory_, [this](PlaceId place) { return step_of(place); }, known_loops_);
-  }
-
   [[nodiscard]] const Features& features(PlaceId place, const Observation& seen) const {
-    return memory_.features(place, seen.work->held);
-  }
-
-  /// See RankedPlace::place.
-  [[nodiscard]] SessionFrame origin(PlaceId place) const {
-    const PlaceId begin = memory_.session_begin();
-    return place < begin ? memory_.origin(place) : SessionFrame{0, place - begin};
-  }
-
-  /// The reverse of origin(); none if there is no such place.
-  [[nodiscard]] std::optional<PlaceId> find(const SessionFrame& at) const {
-    if (at.session != 0) return memory_.find(at);
-    if (at.frame < 0 || at.frame >= size()) return std::nullopt;
-    return memory_.session_begin() + at.frame;
+    return places_.features(place, seen.work->held);
   }
 
   [[nodiscard]] Error missing(const SessionFrame& at) const {
@@ -446,20 +358,6 @@ class LoopDetector::Impl {
                         at.session, at.frame)};
   }
 
-  [[nodiscard]] Spot spot_of(PlaceId place) const {
-    return {step_of(place), known_loops_.first_visit(step_of(place))};
-  }
-
-  /// See VerifiedCandidate::step.
-  [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const {
-    return place < memory_.session_begin() ? memory_.step_of(place) : recent_view_.step_of(place);
-  }
-
-  /// How many changes of view the places below `end` have seen.
-  [[nodiscard]] std::ptrdiff_t steps_before(PlaceId end) const {
-    return memory_.earlier_steps() + (end == 0 ? 0 : recent_view_.step_of(end - 1) + 1);
-  }
-
   /// The answer before there is any. Throws Error (kind input) for what cannot be used.
   [[nodiscard]] Detection unanswered(const Given& given) const {
     check_time(given.timestamp_s);
@@ -467,7 +365,7 @@ class LoopDetector::Impl {
     return {.frame = size(),
             .timestamp_s = given.timestamp_s,
             .odometry = given.odometry,
-            .epoch = epoch_};
+            .epoch = places_.epoch()};
   }
 
   void check(const std::optional<OdometryPose>& odometry) const {
@@ -491,9 +389,9 @@ class LoopDetector::Impl {
   }
 
   /// All of it or, where it throws, nothing.
-  PlaceId add_place(const BinaryContent& content, Features features, const Detection& detection,
-                    const cv::Mat& image) {
-    contents_.reserve_next();
+  void add_place(const BinaryContent& content, Features features,
+                 const std::optional<RecentView::Look>& look, const Detection& detection,
+                 const cv::Mat& image) {
     odometry_.reserve_next();
     // The time of a frame that nothing matches may be wrong, and would shut out those after it.
     const double last_s =
@@ -501,13 +399,12 @@ class LoopDetector::Impl {
     times_s_.push_back(
         detection.status == Status::unreadable ? last_s : detection.timestamp_s.value_or(0.0));
     try {
-      memory_.add(detection, content, std::move(features), image);
+      places_.add(content, std::move(features), look, detection, image);
     } catch (...) {
       times_s_.pop_back();
       throw;
     }
     odometry_.add(detection.odometry);
-    return contents_.add(content);
   }
 
   [[nodiscard]] CandidateVerifier::Query verified_query(const Observation& seen) const {
@@ -527,11 +424,8 @@ class LoopDetector::Impl {
 
   /// How far back the view of a new frame reaches.
   [[nodiscard]] RecentView::Look look(Observation& seen) const {
-    const bool is_step =
-        recent_view_.empty() ||
-        changes_view(seen.content,
-                     similarity(seen.content, contents_.content(recent_view_.latest_step())));
-    return recent_view_.look(contents_.size(), is_step, [&](PlaceId place) {
+    const bool is_step = places_.changes_view(seen.content);
+    return places_.recent_view().look(places_.size(), is_step, [&](PlaceId place) {
       if (is_window_fixed()) return true;
       const Verification& shared = compare(seen, place);
       return moved_inliers(seen.features, features(place, seen), shared.inliers) >=
@@ -541,9 +435,9 @@ class LoopDetector::Impl {
 
   /// See inlier_worth(). A frame that shows the same as the last step can recognise as much.
   [[nodiscard]] int view_inliers(Observation& seen) const {
-    if (options_.decision.count_matches || recent_view_.empty()) return 0;
+    if (options_.decision.count_matches || places_.recent_view().empty()) return 0;
     if (!seen.look.is_step) return latest_view_inliers_;
-    return compare(seen, recent_view_.latest_step()).distinct_inliers;
+    return compare(seen, places_.recent_view().latest_step()).distinct_inliers;
   }
 
   /// What a frame shares with a recent place.
@@ -567,14 +461,14 @@ class LoopDetector::Impl {
                                            std::optional<double> timestamp_s) const {
     const ExclusionOptions& exclusion = options_.exclusion;
     PlaceId first = look.begin;
-    if (exclusion.frames > 0) first = contents_.size() - exclusion.frames;
+    if (exclusion.frames > 0) first = places_.size() - exclusion.frames;
     if (exclusion.seconds > 0) {
       const auto recent =
           std::upper_bound(times_s_.begin(), times_s_.end(), *timestamp_s - exclusion.seconds);
-      first = memory_.session_begin() + static_cast<PlaceId>(recent - times_s_.begin());
+      first = places_.session_begin() + static_cast<PlaceId>(recent - times_s_.begin());
     }
-    return std::max(memory_.session_begin(),
-                    std::min(first, contents_.size() - exclusion.min_frames));
+    return std::max(places_.session_begin(),
+                    std::min(first, places_.size() - exclusion.min_frames));
   }
 
   /// See RankedPlace::score.
@@ -584,23 +478,19 @@ class LoopDetector::Impl {
   }
 
   [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const {
-    return {place, similarity(content, contents_.content(place),
+    return {place, similarity(content, places_.contents().content(place),
                               options_.retrieval.shift_tolerance_columns)};
-  }
-
-  /// The first place of a step.
-  [[nodiscard]] std::optional<PlaceId> place_of(std::ptrdiff_t step) const {
-    return step < 0 ? memory_.place_of(step) : recent_view_.place_of(step);
   }
 
   /// How far `place` is by odometry, see Reach::chi2(): the most of all visits before `end`, since
   /// what drifted least since one of them tells most. Places of earlier sessions are not known to
   /// odometry.
   [[nodiscard]] double chi2(const Reach& reach, PlaceId place, PlaceId end) const {
-    const PlaceId begin = memory_.session_begin();
+    const PlaceId begin = places_.session_begin();
+    const std::ptrdiff_t step = places_.step_of(place);
     double most = place < begin ? 0 : reach.chi2(place - begin);
-    known_loops_.for_each_visit(step_of(place), recent_view_.step_of(end), [&](std::ptrdiff_t at) {
-      const auto visited = at == step_of(place) ? std::nullopt : place_of(at);
+    places_.known_loops().for_each_visit(step, places_.step_of(end), [&](std::ptrdiff_t at) {
+      const auto visited = at == step ? std::nullopt : places_.place_of(at);
       if (visited && *visited >= begin) most = std::max(most, reach.chi2(*visited - begin));
     });
     return most;
@@ -613,7 +503,7 @@ class LoopDetector::Impl {
                                         Observation& seen) const {
     RetrievalOptions retrieval = options_.retrieval;
     if (detection.odometry) retrieval.max_candidates *= kLookAlikes;
-    auto similar = contents_.query(seen.content, end, retrieval, seen.is_allowed);
+    auto similar = places_.contents().query(seen.content, end, retrieval, seen.is_allowed);
     if (!detection.odometry) return similar;
     keep_in_reach(*detection.odometry, end, seen);
     const auto most = static_cast<std::size_t>(options_.retrieval.max_candidates);
@@ -670,7 +560,7 @@ class LoopDetector::Impl {
     for (const std::ptrdiff_t middle :
          PlaceFilter::likeliest(prior, kMinFollowedProbability, kFollowedPaths)) {
       for (std::ptrdiff_t step = middle - kFollowedReach; step <= middle + kFollowedReach; ++step) {
-        const auto place = place_of(step);
+        const auto place = places_.place_of(step);
         if (!place || !is_candidate(*place, end, seen)) continue;
         if (is_among(candidates, *place)) continue;
         const Candidate expected = candidate(*place, seen.content);
@@ -685,24 +575,24 @@ class LoopDetector::Impl {
     const DecisionOptions& decision = options_.decision;
     if (std::ranges::none_of(seen.verified, &VerifiedCandidate::may_match)) {
       detection.status =
-          contents_.any_before(end) ? Status::no_similar_place : Status::no_earlier_place;
+          places_.contents().any_before(end) ? Status::no_similar_place : Status::no_earlier_place;
     }
     if (decision.count_matches) return decide_by_matches(seen, detection);
     const PlaceFilter::Steps steps{
-        .number = steps_before(end),
+        .number = places_.steps_before(end),
         .may_be_at =
             [&](std::ptrdiff_t step) {
-              const auto place = place_of(step);
+              const auto place = places_.place_of(step);
               return place && is_candidate(*place, end, seen);
             },
         .return_weight =
             [&](std::ptrdiff_t step) {
-              const auto place = seen.reach ? place_of(step) : std::nullopt;
+              const auto place = seen.reach ? places_.place_of(step) : std::nullopt;
               return place ? Reach::weight(chi2(*seen.reach, *place, end)) : 1.0;
             },
         .is_step = seen.look.is_step};
-    seen.update =
-        place_filter_.update(std::move(prior), seen.verified, num_similar, steps, known_loops_);
+    seen.update = place_filter_.update(std::move(prior), seen.verified, num_similar, steps,
+                                       places_.known_loops());
     if (!seen.update.match) return;
     report_match(seen.verified[*seen.update.match], seen, detection);
     detection.score = seen.update.probability;
@@ -744,7 +634,7 @@ class LoopDetector::Impl {
     if (options_.decision.count_matches) {
       return v.geometry->matches >= options_.decision.min_score ? 1 : 0;
     }
-    return place_filter_.probability_alone(*v.geometry, steps_before(end));
+    return place_filter_.probability_alone(*v.geometry, places_.steps_before(end));
   }
 
   /// What the frame tells of those before it.
@@ -752,7 +642,7 @@ class LoopDetector::Impl {
     const DecisionOptions& decision = options_.decision;
     if (decision.count_matches) return;
     seen.changed =
-        late_loops_.find(seen.update, seen.look.is_step, decision.min_score, known_loops_);
+        late_loops_.find(seen.update, seen.look.is_step, decision.min_score, places_.known_loops());
     for (const LateLoops::Loop& loop : seen.changed.late) {
       detection.late_loops.push_back(late_loop(loop));
     }
@@ -762,7 +652,7 @@ class LoopDetector::Impl {
   }
 
   [[nodiscard]] LateLoop late_loop(const LateLoops::Loop& loop) const {
-    LateLoop late{.frame = loop.frame - memory_.session_begin(),
+    LateLoop late{.frame = loop.frame - places_.session_begin(),
                   .score = loop.probability,
                   .similarity = loop.similarity};
     set_match(loop.match, late);
@@ -772,10 +662,10 @@ class LoopDetector::Impl {
   /// `Found`: a Detection or a LateLoop.
   template <typename Found>
   void set_match(PlaceId place, Found& found) const {
-    if (place < memory_.session_begin()) {
-      found.earlier_match = memory_.origin(place);
+    if (place < places_.session_begin()) {
+      found.earlier_match = places_.origin(place);
     } else {
-      found.match = place - memory_.session_begin();
+      found.match = place - places_.session_begin();
     }
   }
 
@@ -809,15 +699,11 @@ class LoopDetector::Impl {
   cv::Mat1b mask_;             ///< of all images; empty = none
   BinaryContent excluded_;     ///< by the mask
   std::optional<CameraModel> camera_;
-  PlaceMemory memory_;
-  PlaceContents contents_;
-  std::int64_t epoch_ = 0;       ///< see Detection::epoch
+  Places places_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
-  RecentView recent_view_;
   AttachedParts attached_parts_;
   CandidateFilter filter_;
   int latest_view_inliers_ = 0;  ///< see inlier_worth()
-  KnownLoops known_loops_;
   PlaceFilter place_filter_;
   LateLoops late_loops_;
   mutable Workspaces workspaces_;

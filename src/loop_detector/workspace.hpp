@@ -14,22 +14,14 @@
 #include "loopbit/verification.hpp"
 
 #include "candidate_verifier.hpp"
-#include "place_memory.hpp"
+#include "places.hpp"
 
 namespace loopbit {
 
 /// The working memory of one call of a detector.
 struct Workspace {
-  Workspace(const LoopDetectorOptions& options, const PlaceMemory& memory,
-            std::function<std::ptrdiff_t(PlaceId)> step_of, const KnownLoops& known_loops)
-      : surf(options.surf),
-        verifier(options.verification),
-        candidates(options,
-                   {[this, &memory](PlaceId place) -> const Features& {
-                      return memory.features(place, held);
-                    },
-                    std::move(step_of)},
-                   known_loops) {}
+  Workspace(const LoopDetectorOptions& options, const Places& places)
+      : surf(options.surf), verifier(options.verification), candidates(options, places, held) {}
 
   SurfExtractor surf;
   Verifier verifier;
