@@ -15,7 +15,7 @@ namespace loopbit::test {
 namespace {
 
 /// A frame of a path that alone is far from sure.
-constexpr Found kWeak{.votes = 18};
+constexpr Found kWeak{.votes = 20};
 
 /// Follows a path from step 100 with weak frames until the filter is sure; returns the frames that
 /// were loops at once, and notes the late ones.

@@ -34,11 +34,12 @@ double mass(const Belief& belief) {
 }
 
 TEST(PlaceFilter, APathIsFollowedForwardBackwardAndAtTwoStepsPerStep) {
+  constexpr Found kAtDusk{.votes = 30};
   for (const std::ptrdiff_t speed : {1, 2, -1, -2}) {
     FilterRobot robot;
-    const double first = robot.see({{100, kByNight}}).probability;
+    const double first = robot.see({{100, kAtDusk}}).probability;
     EXPECT_LT(first, 0.5) << "one such frame may be chance";
-    const auto update = robot.follow(100 + speed, speed, 15, kByNight);
+    const auto update = robot.follow(100 + speed, speed, 15, kAtDusk);
     EXPECT_GT(update.probability, 0.98) << speed;
     EXPECT_EQ(matched_step(update), 100 + 15 * speed);
     double forward = 0;
@@ -67,6 +68,29 @@ TEST(PlaceFilter, VotesCountMoreWhereTheDisplacementIsSteady) {
   EXPECT_GT(with.probability, without.probability);
 }
 
+/// How probable a path is after `steps` that look somewhat like it, on a map where streets look
+/// like others for as long as they last, or from step to step by chance.
+double probability_after(int steps, bool streets_last) {
+  FilterRobot robot(0);
+  std::mt19937 random(5);
+  for (int i = 0; i < 120; ++i) {
+    FoundAt streets;
+    for (int street = 0; street < 8; ++street) {
+      const unsigned percent = !streets_last ? 50 : street % 2 == 0 ? 85 : 15;
+      const bool looks_alike = random() % 100 < percent;
+      streets[8000 + 300 * street + i] = {.votes = looks_alike ? 8 : 1};
+    }
+    robot.see(streets);
+  }
+  return robot.follow(100, 1, steps, {.votes = 12}).probability;
+}
+
+TEST(PlaceFilter, AStreetThatLooksLikeAnotherForLongIsNoLoop) {
+  // As when a camera takes thirty images a second: the same street has ten times as many steps.
+  EXPECT_GT(probability_after(40, false), 0.98);
+  EXPECT_LT(probability_after(40, true), 0.5);
+}
+
 TEST(PlaceFilter, FramesThatJumpAreNoPath) {
   FilterRobot robot;
   for (int i = 0; i < 16; ++i) {
@@ -91,8 +115,8 @@ TEST(PlaceFilter, ChanceInliersAreNoEvidence) {
 
 TEST(PlaceFilter, StandingStillAddsNothing) {
   FilterRobot robot;
-  robot.follow(100, 1, 4, kByNight);
-  const FoundAt found{{104, kByNight}};
+  robot.follow(100, 1, 5, kByNight);
+  const FoundAt found{{105, kByNight}};
   const double moving = robot.look(found).probability;
   ASSERT_GT(moving, 0.01);
   ASSERT_LT(moving, 0.999);

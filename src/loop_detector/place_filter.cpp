@@ -73,8 +73,6 @@ void share_among_laps(const KnownLoops& loops, std::vector<Hypothesis>& places) 
   }
 }
 
-using ByStep = PlaceFilter::ByStep;
-
 /// The largest value of each step, in their order.
 template <typename Value>
 ByStep largest_of_steps(const std::vector<PlaceFilter::Observed>& observed, const Value& value) {
@@ -274,20 +272,20 @@ std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>
   return sigmas;
 }
 
-/// Consecutive frames are not independent witnesses: the more alike a wrong place looks from one
-/// step to the next, the less each of them counts.
-double PlaceFilter::independence() const {
+/// The more alike a wrong place looks from one step to the next, the less the inliers of each
+/// count.
+double PlaceFilter::geometry_independence() const {
   const double correlation = std::clamp(same_path_products_ / same_path_squares_, 0.0, 0.95);
-  return (1 - correlation) / (1 + correlation);
+  return std::min(1.0, kGeometryIndependence * (1 - correlation) / (1 + correlation));
 }
 
 /// Where the displacement is steady, votes say more; how much more is measured on its own.
 double PlaceFilter::votes_log_ratio(double sigmas, std::size_t num_null,
                                     const std::optional<SteadyDisplacements::Seen>& steady) const {
   const double ratio = VotesRatio(num_null).of(sigmas);
-  const double known = independence() * std::log(ratio);
+  const double known = votes_.independence() * std::log(ratio);
   if (!steady) return known;
-  return known + std::min(independence(), steady_.independence()) *
+  return known + std::min(votes_.independence(), steady_.independence()) *
                      std::log(1 - kSteady + kSteady * std::min(kMostSteady, steady->ratio / ratio));
 }
 
@@ -304,7 +302,7 @@ double PlaceFilter::geometry_log_ratio(const CandidateGeometry& geometry,
   const double at_beginning =
       std::log(steps * kGeometryDensity * tail_.excess / (rate * tail_.count));
   const double growth = (tail_.count + 1) * std::log1p(excess / tail_.excess);
-  return std::min(1.0, kGeometryIndependence * independence()) *
+  return geometry_independence() *
          std::max(0.0, growth + std::min(1.0, excess / kFullExcess) * at_beginning);
 }
 
@@ -409,7 +407,9 @@ void PlaceFilter::learn(const Update& update, const KnownLoops& loops, Next& nex
   }
   // Another storey, which cannot match, looks like this one all along a path.
   std::erase_if(wrong, [](const Observed& o) { return !o.may_match; });
-  for (const auto& [step, sigmas] : largest_of_steps(wrong, deviation)) {
+  const ByStep on_paths = largest_of_steps(wrong, deviation);
+  next.votes = votes_.prepare(on_paths);
+  for (const auto& [step, sigmas] : on_paths) {
     const auto before = find_step(latest_sigmas_, step - 1);
     if (before == latest_sigmas_.end()) continue;
     next.products += sigmas * before->second;
@@ -440,6 +440,7 @@ void PlaceFilter::commit(Next next) noexcept {
     ++shown.count;
   }
   latest_sigmas_ = std::move(next.sigmas);
+  votes_.commit(std::move(next.votes));
   same_path_products_ += next.products;
   same_path_squares_ += next.squares;
 }

@@ -61,9 +61,6 @@ class PlaceFilter {
     double revisit = 0;      ///< that any match is right
   };
 
-  /// A number for each of some steps, in their order.
-  using ByStep = std::vector<std::pair<std::ptrdiff_t, double>>;
-
   /// A tail that was measured: how often, and how far beyond its beginning on average.
   struct Tail {
     double seen;
@@ -116,6 +113,7 @@ class PlaceFilter {
     Belief belief = {};
     ByStep sigmas = {};
     std::vector<double> shown = {};  ///< what is added for each of `sigmas`
+    WrongPaths::Next votes = {};
     SteadyDisplacements::Next steady = {};
     Tail tail = {};
     double products = 0;
@@ -146,7 +144,7 @@ class PlaceFilter {
   [[nodiscard]] std::vector<double> deviations(const std::vector<VerifiedCandidate>& verified,
                                                std::size_t num_similar) const;
   [[nodiscard]] double mean_shown(std::ptrdiff_t step) const;
-  [[nodiscard]] double independence() const;
+  [[nodiscard]] double geometry_independence() const;
   [[nodiscard]] double votes_log_ratio(
       double sigmas, std::size_t num_null,
       const std::optional<SteadyDisplacements::Seen>& steady) const;
@@ -159,6 +157,7 @@ class PlaceFilter {
   Belief belief_;  ///< of the last frame
   ByStep latest_sigmas_;
   std::unordered_map<std::ptrdiff_t, Shown> shown_;  ///< by step
+  WrongPaths votes_;                                 ///< their deviations
   SteadyDisplacements steady_;
   Tail tail_{1, 10, 10, 10};
   double same_path_products_ = 100;  ///< of deviations along a path, and their squares

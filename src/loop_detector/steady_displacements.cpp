@@ -11,28 +11,8 @@
 namespace loopbit {
 namespace {
 
-/// Places of a path follow each other at one or two steps per step. A robot that stands still sees
-/// the same features again, which tells nothing.
-constexpr std::ptrdiff_t kMinMove = 1;
-constexpr std::ptrdiff_t kMaxMove = 2;
 /// The displacement changes by up to one bin either way, as a move by up to two steps.
 constexpr double change(int bins) { return bins == 0 ? 0.5 : 0.25; }
-/// A path lasts for 32 steps, as for late loops.
-constexpr double kFading = 31.0 / 32.0;
-
-/// Of the items whose step is one or two steps from `step`, the one that is preferred.
-template <typename Items, typename StepOf, typename IsBetter>
-auto before(const Items& items, std::ptrdiff_t step, const StepOf& step_of,
-            const IsBetter& is_better) {
-  auto best = items.end();
-  for (auto at = items.begin(); at != items.end(); ++at) {
-    const std::ptrdiff_t move = std::abs(step_of(*at) - step);
-    if (move < kMinMove || move > kMaxMove) continue;
-    if (best == items.end() || is_better(*at, *best)) best = at;
-  }
-  return best;
-}
-
 using Others = std::vector<const Displacements*>;
 
 /// Of the votes in a square, from those of other places there.
@@ -66,7 +46,7 @@ SteadyDisplacements::Seen seen_around(Displacements::Square square, const Displa
 std::optional<Displacements::Square> SteadyDisplacements::expected(std::ptrdiff_t step,
                                                                    bool is_step) const {
   const auto& steps = is_step ? latest_ : before_;
-  const auto found = before(
+  const auto found = next_to(
       steps, step, [](const auto& each) { return each.first; },
       [&](const auto& a, const auto& b) {
         return std::abs(a.first - step) < std::abs(b.first - step);
@@ -94,32 +74,13 @@ std::vector<std::optional<SteadyDisplacements::Seen>> SteadyDisplacements::look(
   return all;
 }
 
-double SteadyDisplacements::independence() const { return std::min(1.0, square_sums_ / sum_sq_); }
-
-SteadyDisplacements::Next SteadyDisplacements::prepare(
-    Squares fullest, const std::vector<std::pair<std::ptrdiff_t, double>>& wrong) const {
-  Next next{.fullest = std::move(fullest)};
-  for (const auto& [step, sigmas] : wrong) {
-    const auto found = before(
-        wrong_, step, [](const Path& path) { return path.step; },
-        [](const Path& a, const Path& b) { return a.sum > b.sum; });
-    Path path{.step = step, .sum = sigmas, .weight = 1};
-    if (found != wrong_.end()) {
-      path.sum += kFading * found->sum;
-      path.weight += kFading * kFading * found->weight;
-    }
-    next.sum_sq += path.sum * path.sum;
-    next.square_sums += path.weight * sigmas * sigmas;
-    next.wrong.push_back(path);
-  }
-  return next;
+SteadyDisplacements::Next SteadyDisplacements::prepare(Squares fullest, const ByStep& wrong) const {
+  return {.fullest = std::move(fullest), .wrong = wrong_.prepare(wrong)};
 }
 
 void SteadyDisplacements::commit(Next next) noexcept {
   before_ = std::exchange(latest_, std::move(next.fullest));
-  wrong_ = std::move(next.wrong);
-  sum_sq_ += next.sum_sq;
-  square_sums_ += next.square_sums;
+  wrong_.commit(std::move(next.wrong));
 }
 
 }  // namespace loopbit

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "candidate_verifier.hpp"
+#include "wrong_paths.hpp"
 
 namespace loopbit {
 
@@ -34,27 +35,17 @@ class SteadyDisplacements {
       const std::vector<VerifiedCandidate>& verified, std::size_t num_similar, bool is_step,
       const IsNear& is_near) const;
 
-  /// How much one step counts: along a wrong path, it tells less the longer its deviations last.
-  [[nodiscard]] double independence() const;
-
-  /// Deviations of wrong places that follow each other, summed up; older ones fade.
-  struct Path {
-    std::ptrdiff_t step = 0;
-    double sum = 0;
-    double weight = 0;  ///< of squares, if they were independent
-  };
+  /// How many independent witnesses one step is worth; see WrongPaths.
+  [[nodiscard]] double independence() const { return wrong_.independence(); }
 
   /// What commit() changes.
   struct Next {
     Squares fullest = {};
-    std::vector<Path> wrong = {};
-    double sum_sq = 0;
-    double square_sums = 0;
+    WrongPaths::Next wrong = {};
   };
 
-  /// `wrong`: the deviations of steps where the robot is not, in their order.
-  [[nodiscard]] Next prepare(Squares fullest,
-                             const std::vector<std::pair<std::ptrdiff_t, double>>& wrong) const;
+  /// `wrong`: the deviations of steps where the robot is not.
+  [[nodiscard]] Next prepare(Squares fullest, const ByStep& wrong) const;
 
   void commit(Next next) noexcept;
 
@@ -64,9 +55,7 @@ class SteadyDisplacements {
 
   Squares latest_;  ///< of the latest step
   Squares before_;  ///< of the one before it
-  std::vector<Path> wrong_;
-  double sum_sq_ = 300;  ///< of `sum`; as if one step in three were independent
-  double square_sums_ = 100;
+  WrongPaths wrong_;
 };
 
 }  // namespace loopbit
