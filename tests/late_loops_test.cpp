@@ -169,7 +169,7 @@ TEST(LateLoops, ItLooksBackABoundedWay) {
 
 TEST(PathMotion, OneStepEarlierUndoesOneStepLater) {
   Belief belief{{{100, 0.4, 0.1}, {200, 0.2, 0.0}}};
-  Belief prior = one_step_later(belief);
+  Belief prior = one_step_later(belief, 1);
   const Returns returns = returns_to({100, 101, 500, 100}, kSteps,
                                      [](std::ptrdiff_t step) { return step == 101 ? 0.5 : 1.0; });
   ASSERT_EQ(returns.size(), 3U);

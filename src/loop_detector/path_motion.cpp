@@ -14,6 +14,9 @@ namespace {
 /// for as long in between. Where frames say little, such as by night, this limits the score.
 constexpr double kLeave = 0.01;
 constexpr double kReturn = 0.01;
+/// A hundred changes of view are 33 independent ones, as long as nothing is known. With more images
+/// of the same path, each has less to say, and the path ends at it more seldom.
+constexpr double kLeaveIndependent = 3 * kLeave;
 /// A path is followed at 0, 1 or 2 steps per step, most likely at the speed of before.
 constexpr std::array kMoves{0.25, 0.5, 0.25};
 /// Robots seldom turn round on a path.
@@ -116,18 +119,19 @@ Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,
   return returns;
 }
 
-Belief one_step_later(const Belief& belief) {
+Belief one_step_later(const Belief& belief, double independence) {
+  const double leave = std::min(kLeave, kLeaveIndependent * independence);
   std::map<std::ptrdiff_t, Hypothesis> next;
   for (const Hypothesis& h : belief.places) {
-    const double forward = (1 - kLeave) * ((1 - kTurn) * h.forward + kTurn * h.backward);
-    const double backward = (1 - kLeave) * ((1 - kTurn) * h.backward + kTurn * h.forward);
+    const double forward = (1 - leave) * ((1 - kTurn) * h.forward + kTurn * h.backward);
+    const double backward = (1 - leave) * ((1 - kTurn) * h.backward + kTurn * h.forward);
     for (std::size_t moved = 0; moved < kMoves.size(); ++moved) {
       const auto steps = static_cast<std::ptrdiff_t>(moved);
       next[h.step + steps].forward += kMoves[moved] * forward;
       next[h.step - steps].backward += kMoves[moved] * backward;
     }
   }
-  Belief later;
+  Belief later{.places = {}, .leave = leave};
   later.places.reserve(next.size());
   for (const auto& [step, h] : next) later.places.push_back({step, h.forward, h.backward});
   return later;
@@ -157,9 +161,9 @@ Belief one_step_earlier(const Belief& belief, const Belief& prior, const Returns
       backward += kMoves[moved] * near[kMostMoved - moved].backward;
     }
     const double turned = kTurn * (forward + backward);
-    const double left = kLeave * ratios.away();
-    h.forward *= (1 - kLeave) * ((1 - 2 * kTurn) * forward + turned) + left;
-    h.backward *= (1 - kLeave) * ((1 - 2 * kTurn) * backward + turned) + left;
+    const double left = prior.leave * ratios.away();
+    h.forward *= (1 - prior.leave) * ((1 - 2 * kTurn) * forward + turned) + left;
+    h.backward *= (1 - prior.leave) * ((1 - 2 * kTurn) * backward + turned) + left;
     sum += h.probability();
   }
   if (sum <= 0) return {};

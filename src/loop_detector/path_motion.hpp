@@ -21,6 +21,7 @@ struct Hypothesis {
 /// A probability for each of a few steps, in their order; the rest is somewhere new.
 struct Belief {
   std::vector<Hypothesis> places;
+  double leave = 0;  ///< predicted with this probability that the path was left
 
   [[nodiscard]] double elsewhere() const;
   [[nodiscard]] double at(std::ptrdiff_t step) const;
@@ -54,8 +55,9 @@ Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,
 /// That a robot which returns does so to a certain one of `num_steps` steps.
 double from_anywhere(std::ptrdiff_t num_steps);
 
-/// Where the robot is one step later, if it follows a path.
-Belief one_step_later(const Belief& belief);
+/// Where the robot is one step later, if it follows a path. `independence`: how many independent
+/// witnesses a step is worth, see WrongPaths.
+Belief one_step_later(const Belief& belief, double independence);
 
 /// Adds what a robot elsewhere may return to.
 void add_returns(const Returns& returns, Belief& belief);

@@ -236,7 +236,7 @@ std::optional<std::size_t> PlaceFilter::match_near(std::ptrdiff_t middle,
 }
 
 Belief PlaceFilter::predict(bool is_step) const {
-  return is_step ? one_step_later(belief_) : before_;
+  return is_step ? one_step_later(belief_, votes_.independence()) : before_;
 }
 
 std::vector<std::ptrdiff_t> PlaceFilter::likeliest(const Belief& belief, double min_probability,
