@@ -15,6 +15,7 @@
 #include "known_loops.hpp"
 #include "path_motion.hpp"
 #include "steady_displacements.hpp"
+#include "wrong_paths.hpp"
 
 namespace loopbit {
 

@@ -13,6 +13,7 @@ namespace {
 
 /// The displacement changes by up to one bin either way, as a move by up to two steps.
 constexpr double change(int bins) { return bins == 0 ? 0.5 : 0.25; }
+
 using Others = std::vector<const Displacements*>;
 
 /// Of the votes in a square, from those of other places there.
