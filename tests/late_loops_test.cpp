@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <map>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -165,6 +166,15 @@ TEST(LateLoops, ItLooksBackABoundedWay) {
   for (int i = 8; i < 12; ++i) walk.see({{100 + i, kByDay}});
   ASSERT_GT(walk.late.size(), 50U);
   for (const auto& [frame, loop] : walk.late) EXPECT_GE(frame, end - 128);
+}
+
+TEST(PathMotion, APathEndsMoreSeldomWhereEachStepCountsLess) {
+  const Belief belief{{{100, 0.6, 0.4}}};
+  for (const auto& [independence, leave] : {std::pair{1.0, 0.01}, {0.5, 0.01}, {0.1, 0.003}}) {
+    const Belief later = one_step_later(belief, independence);
+    EXPECT_NEAR(later.leave, leave, 1e-12) << independence;
+    EXPECT_NEAR(later.elsewhere(), leave, 1e-12) << independence;
+  }
 }
 
 TEST(PathMotion, OneStepEarlierUndoesOneStepLater) {
