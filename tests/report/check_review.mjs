@@ -148,6 +148,8 @@ export async function checkEnlarge(page) {
 }
 
 async function downloaded(page, selector) {
+  // Chromium drops what exceeds ten downloads in a second.
+  await page.waitForTimeout(100);
   const [file] = await Promise.all([page.waitForEvent("download"), page.click(selector)]);
   return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()), file };
 }

@@ -262,7 +262,10 @@ async function checkTimeBars(page, run) {
   }
 }
 
-/** `isBrief`: fewer frames are clicked, and only the matrix is zoomed, which depends most on the data. */
+const kZoomed = ["#trajectory", "#score", "#matrix"];
+
+/** `isBrief`: fewer frames are clicked, and only the matrix is zoomed, which depends most on the data, and
+ * not by keys. */
 export async function checkViews(page, isBrief) {
   const run = (await embedded(page)).runs[0];
   const loops = run.status.flatMap((status, i) => (run.status_names[status] === "loop" ? [i] : []));
@@ -279,12 +282,13 @@ export async function checkViews(page, isBrief) {
     await checkMatrixRing(page, run);
   }
   if (run.frames > 10) {
-    const zoomed = isBrief ? ["#matrix"] : ["#trajectory", "#score", "#matrix"];
     await goTo(page, frames.at(-1));
-    for (const view of zoomed) await checkZoom(page, view);
+    for (const view of isBrief ? ["#matrix"] : kZoomed) await checkZoom(page, view);
+  }
+  if (run.frames > 10 && !isBrief) {
     if (loops.length > 0) await page.locator("[data-filter=loops]").press("Enter");
     await goTo(page, frames.at(-1));
-    for (const view of zoomed) await checkKeyZoom(page, view);
+    for (const view of kZoomed) await checkKeyZoom(page, view);
     await page.locator("[data-filter=all]").press("Enter");
   }
   await checkCell(page, run);
