@@ -23,8 +23,8 @@ function(loopbit_kernels part)
   set(flags_dotprod -march=armv8.2-a+dotprod)
 
   if(LOOPBIT_SANITIZE MATCHES undefined)
-    # Undefined behaviour is a fault of the source: the checks of the scalar code find it. They make these loops ten
-    # times as slow, and all but the tests of the loops themselves run those of the best set.
+    # Checks for undefined behaviour make these loops ten times as slow. Such a fault is in the source, so to check the
+    # scalar form is enough: the tests of the loops run it, too.
     list(TRANSFORM ARGN APPEND _loops.cpp OUTPUT_VARIABLE loop_sources)
     set_property(
       SOURCE ${loop_sources} PROPERTY COMPILE_OPTIONS

@@ -262,10 +262,7 @@ async function checkTimeBars(page, run) {
   }
 }
 
-const kZoomed = ["#trajectory", "#score", "#matrix"];
-
-/** `isBrief`: fewer frames are clicked, and only the matrix is zoomed, which depends most on the data, and
- * not by keys. */
+/** `isBrief`: fewer frames are clicked, and only the matrix is zoomed, which depends most on the data. */
 export async function checkViews(page, isBrief) {
   const run = (await embedded(page)).runs[0];
   const loops = run.status.flatMap((status, i) => (run.status_names[status] === "loop" ? [i] : []));
@@ -282,13 +279,12 @@ export async function checkViews(page, isBrief) {
     await checkMatrixRing(page, run);
   }
   if (run.frames > 10) {
+    const zoomed = isBrief ? ["#matrix"] : ["#trajectory", "#score", "#matrix"];
     await goTo(page, frames.at(-1));
-    for (const view of isBrief ? ["#matrix"] : kZoomed) await checkZoom(page, view);
-  }
-  if (run.frames > 10 && !isBrief) {
+    for (const view of zoomed) await checkZoom(page, view);
     if (loops.length > 0) await page.locator("[data-filter=loops]").press("Enter");
     await goTo(page, frames.at(-1));
-    for (const view of kZoomed) await checkKeyZoom(page, view);
+    for (const view of zoomed) await checkKeyZoom(page, view);
     await page.locator("[data-filter=all]").press("Enter");
   }
   await checkCell(page, run);
