@@ -9,6 +9,10 @@ import loopbit
 def show(found):
     if found.is_loop:
         print(f"{found.frame} is {found.match}, score {found.score:g}")
+    for loop in found.late_loops:  # of frames just before
+        print(f"{loop.frame} is {loop.match}, score {loop.score:g}, found late")
+    for loop in found.withdrawn_loops:
+        print(f"{loop.frame} is not {loop.match} after all")
 
 
 # An unusable frame is reported, counted and skipped.

@@ -3,8 +3,8 @@
 //
 // Loop closure in a keyframe SLAM. The tracker passes its keyframes on and continues. A separate
 // thread finds the loops and passes them to the back end. Here the "tracker" takes every third
-// image of a sequence as a keyframe, and the "back end" prints the edge that it would add to its
-// pose graph.
+// image of a sequence as a keyframe, and the "back end" prints the edges that it would add to its
+// pose graph or remove from it.
 //
 //   keyframe_slam INPUT    INPUT as in `loopbit run`
 #include <condition_variable>
@@ -30,13 +30,18 @@ struct Keyframe {
   cv::Mat image;
 };
 
+/// What the back end does with a loop. Called from the worker thread.
+struct BackEnd {
+  std::function<void(KeyframeId query, KeyframeId match, double score)> add_edge;
+  std::function<void(KeyframeId query, KeyframeId match)> remove_edge;
+};
+
 /// Finds loops among keyframes in the order in which they are added. add() does not wait for the
-/// detection. `on_loop(query, match, score)` is called from the worker thread.
+/// detection.
 class LoopCloser {
  public:
-  using OnLoop = std::function<void(KeyframeId, KeyframeId, double)>;
-
-  explicit LoopCloser(OnLoop on_loop) : on_loop_(std::move(on_loop)), thread_([this] { work(); }) {}
+  explicit LoopCloser(BackEnd back_end)
+      : back_end_(std::move(back_end)), thread_([this] { work(); }) {}
 
   /// Processes all keyframes that were added, then stops.
   ~LoopCloser() {
@@ -87,12 +92,23 @@ class LoopCloser {
     const loopbit::Detection found = process(keyframe);
     // loopbit numbers frames 0, 1, 2, ...; the back end has its own ids.
     ids_.push_back(keyframe.id);
+    const auto id_of = [&](loopbit::PlaceId frame) {
+      return ids_[static_cast<std::size_t>(frame)];
+    };
     if (found.status == loopbit::Status::loop) {
-      on_loop_(keyframe.id, ids_[static_cast<std::size_t>(*found.match)], found.score);
+      back_end_.add_edge(keyframe.id, id_of(*found.match), found.score);
+    }
+    // Loops of keyframes just before, of which only this one made sure.
+    for (const loopbit::LateLoop& loop : found.late_loops) {
+      back_end_.add_edge(id_of(loop.frame), id_of(*loop.match), loop.score);
+    }
+    // Loops that are now more likely wrong than right.
+    for (const loopbit::LateLoop& loop : found.withdrawn_loops) {
+      back_end_.remove_edge(id_of(loop.frame), id_of(*loop.match));
     }
   }
 
-  OnLoop on_loop_;
+  BackEnd back_end_;
   loopbit::LoopDetector detector_;
   std::vector<KeyframeId> ids_;
   std::mutex mutex_;
@@ -104,9 +120,15 @@ class LoopCloser {
 
 void run(const char* input) {
   constexpr KeyframeId kEvery = 3;
-  LoopCloser closer([](KeyframeId query, KeyframeId match, double score) {
-    std::cout << "edge " << query << " -> " << match << ", score " << score << '\n';
-  });
+  LoopCloser closer({.add_edge =
+                         [](KeyframeId query, KeyframeId match, double score) {
+                           std::cout << "edge " << query << " -> " << match << ", score " << score
+                                     << '\n';
+                         },
+                     .remove_edge =
+                         [](KeyframeId query, KeyframeId match) {
+                           std::cout << "no edge " << query << " -> " << match << '\n';
+                         }});
   const auto source = loopbit::open_source(input);
   KeyframeId id = 0;
   for (loopbit::Frame frame; source->next(frame); ++id) {

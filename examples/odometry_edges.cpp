@@ -1,13 +1,14 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 //
-// loopbit beside your own odometry: for each loop it prints the edge that a pose graph needs, with
-// its information matrix, as a line of g2o.
+// loopbit beside your own odometry: for each loop, also one found late, it prints the edge that a
+// pose graph needs, with its information matrix, as a line of g2o.
 //
 //   odometry_edges INPUT POSES CAMERA    POSES: camera to world, 12 numbers (3 x 4) per image
 #include <fstream>
 #include <iostream>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <loopbit/camera_file.hpp>
@@ -28,21 +29,26 @@ int main(int argc, char** argv) try {
     poses.push_back(cv::Matx44d::eye());
     for (int i = 0; i < 12; ++i) odometry >> poses.back().val[i];
     if (!odometry) throw std::invalid_argument("POSES has fewer rows than there are images.");
-    const loopbit::Detection loop = detector.process(frame.image);
-    if (loop.status != loopbit::Status::loop || loop.match.value_or(0) == 0) continue;
-    // The images before and after the match are a baseline of known length.
-    const int match = *loop.match;
-    std::vector<loopbit::Features> seen;
-    for (const int i : {loop.frame, match, match - 1, match + 1})
-      seen.push_back(detector.features_of({0, i}));
-    const cv::Matx44d T_match_world = poses[match].inv();
-    const std::vector<loopbit::NearbyView> beside{
-        {{&seen[2], &camera}, T_match_world * poses[match - 1]},
-        {{&seen[3], &camera}, T_match_world * poses[match + 1]}};
-    const loopbit::RelativePose edge = estimator.estimate(
-        {.query = {&seen[0], &camera}, .match = {&seen[1], &camera}, .beside = beside});
-    if (edge.known != loopbit::PoseKnown::metric) continue;
-    std::cout << to_g2o_edge(edge, match, loop.frame) << '\n';
+    const loopbit::Detection found = detector.process(frame.image);
+    std::vector<std::pair<int, int>> loops;
+    if (found.status == loopbit::Status::loop) loops.emplace_back(found.frame, *found.match);
+    for (const loopbit::LateLoop& late : found.late_loops)
+      loops.emplace_back(late.frame, *late.match);
+    for (const auto& [query, match] : loops) {
+      if (match == 0) continue;
+      // The images before and after the match are a baseline of known length.
+      std::vector<loopbit::Features> seen;
+      for (const int i : {query, match, match - 1, match + 1})
+        seen.push_back(detector.features_of({0, i}));
+      const cv::Matx44d T_match_world = poses[match].inv();
+      const std::vector<loopbit::NearbyView> beside{
+          {{&seen[2], &camera}, T_match_world * poses[match - 1]},
+          {{&seen[3], &camera}, T_match_world * poses[match + 1]}};
+      const loopbit::RelativePose edge = estimator.estimate(
+          {.query = {&seen[0], &camera}, .match = {&seen[1], &camera}, .beside = beside});
+      if (edge.known != loopbit::PoseKnown::metric) continue;
+      std::cout << to_g2o_edge(edge, match, query) << '\n';
+    }
   }
 } catch (const std::exception& error) {
   std::cerr << error.what() << '\n';

@@ -45,8 +45,9 @@ without_scores() { cut -d, -f1 "$1" | sort; }
 
 "$python" "$examples/find_loops.py" "$scratch/odd" | tee "$scratch/loops"
 "$prefix/bin/loopbit" run "$scratch/odd" --out "$scratch/run" --no-report 2>"$scratch/progress"
-# As many as the command finds.
-[[ $(wc -l <"$scratch/loops") == $(grep -c ',loop,' "$scratch/run/loops.csv") ]]
+# As many as the command finds, at once and late.
+cut -d, -f1-4 "$scratch"/run/{loops,late_loops}.csv >"$scratch/all"
+[[ $(wc -l <"$scratch/loops") == $(grep -cE ',(loop|late|withdrawn),' "$scratch/all") ]]
 
 "$python" "$examples/paper_figures.py" "$scratch/town/images" "$scratch/town/truth.csv" \
   "$scratch/figures" "$scratch/town/poses.txt"

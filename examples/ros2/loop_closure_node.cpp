@@ -37,12 +37,27 @@ class LoopClosureNode : public rclcpp::Node {
       detector_.skip(time_s);  // frames and times_s_ stay in step
       return;
     }
-    if (found.status != loopbit::Status::loop || !found.match) return;
+    if (found.status == loopbit::Status::loop && found.match) {
+      publish("loop", found.frame, *found.match, found.score);
+    }
+    // Loops of images just before, of which only this one made sure, and loops that are now more
+    // likely wrong than right.
+    for (const loopbit::LateLoop& loop : found.late_loops) {
+      publish("late", loop.frame, *loop.match, loop.score);
+    }
+    for (const loopbit::LateLoop& loop : found.withdrawn_loops) {
+      publish("withdrawn", loop.frame, *loop.match, loop.score);
+    }
+  }
+
+  void publish(const char* type, loopbit::PlaceId query, loopbit::PlaceId match, double score) {
+    const auto time_of = [&](loopbit::PlaceId frame) {
+      return times_s_[static_cast<std::size_t>(frame)];
+    };
     std_msgs::msg::String message;
     message.data = fmt::format(
-        R"({{"query": {}, "match": {}, "query_time_s": {:.9f}, "match_time_s": {:.9f}, "score": {}}})",
-        found.frame, *found.match, time_s, times_s_[static_cast<std::size_t>(*found.match)],
-        found.score);
+        R"({{"type": "{}", "query": {}, "match": {}, "query_time_s": {:.9f}, "match_time_s": {:.9f}, "score": {}}})",
+        type, query, match, time_of(query), time_of(match), score);
     loops_->publish(message);
   }
 
