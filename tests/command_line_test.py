@@ -58,6 +58,22 @@ def rotation_error_deg(row, truth):
     return math.degrees(math.acos(max(-1.0, min(1.0, (trace - 1) / 2))))
 
 
+def motion_jpeg(jpegs):
+    """The bytes of a video, 256 x 192 px at 10 Hz."""
+    def chunk(name, *parts):
+        data = b"".join(parts)
+        return name + struct.pack("<I", len(data)) + data + bytes(len(data) % 2)
+
+    header = struct.pack("<14I", 100000, 0, 0, 0, len(jpegs), 0, 1, 0, 256, 192, 0, 0, 0, 0)
+    stream = b"vidsMJPG" + struct.pack("<IHH8I4H", 0, 0, 0, 0, 1, 10, 0, len(jpegs), 0, 0xFFFFFFFF, 0,
+                                       0, 0, 256, 192)
+    picture = struct.pack("<IiiHH4sIiiII", 40, 256, 192, 1, 24, b"MJPG", 147456, 0, 0, 0, 0)
+    headers = chunk(b"LIST", b"hdrl", chunk(b"avih", header),
+                    chunk(b"LIST", b"strl", chunk(b"strh", stream), chunk(b"strf", picture)))
+    movie = chunk(b"LIST", b"movi", *(chunk(b"00dc", jpeg) for jpeg in jpegs))
+    return chunk(b"RIFF", b"AVI ", headers, movie)
+
+
 class CommandLineTest(CommandTest):
     # Relative poses.
 
@@ -554,21 +570,35 @@ class CommandLineTest(CommandTest):
         ran = loopbit("run", folder, "--out", self.out, "--overwrite", "--max-megapixels", 1200)
         self.assertIn("damaged", ran.stderr)
 
-    def test_a_video_that_is_cut_off_says_so(self):
-        def chunk(name, *parts):
-            data = b"".join(parts)
-            return name + struct.pack("<I", len(data)) + data + bytes(len(data) % 2)
-
+    def test_a_damaged_frame_of_a_video_costs_no_other(self):
         jpegs = self.pictures()[:20]
-        header = struct.pack("<14I", 100000, 0, 0, 0, len(jpegs), 0, 1, 0, 256, 192, 0, 0, 0, 0)
-        stream = b"vidsMJPG" + struct.pack("<IHH8I4H", 0, 0, 0, 0, 1, 10, 0, len(jpegs), 0,
-                                           0xFFFFFFFF, 0, 0, 0, 256, 192)
-        picture = struct.pack("<IiiHH4sIiiII", 40, 256, 192, 1, 24, b"MJPG", 147456, 0, 0, 0, 0)
-        headers = chunk(b"LIST", b"hdrl", chunk(b"avih", header),
-                        chunk(b"LIST", b"strl", chunk(b"strh", stream), chunk(b"strf", picture)))
-        movie = chunk(b"LIST", b"movi", *(chunk(b"00dc", jpeg) for jpeg in jpegs))
         video = self.scratch / "v.avi"
-        whole = chunk(b"RIFF", b"AVI ", headers, movie)
+        for name, damaged in {"first": {0}, "two": {5, 6}, "last": {19}}.items():
+            with self.subTest(name):
+                video.write_bytes(motion_jpeg([jpeg[:200] if i in damaged else jpeg
+                                               for i, jpeg in enumerate(jpegs)]))
+                ran = loopbit("run", video, "--out", self.out, "--overwrite", "--no-report")
+                self.assertEqual(ran.returncode, 0, ran.stderr)
+                unreadable = {int(row["frame"]) for row in rows(self.out) if row["status"] == "unreadable"}
+                # What comes after the last frame that can be read is the end.
+                self.assertEqual((len(rows(self.out)), unreadable),
+                                 (19, set()) if name == "last" else (20, damaged))
+                for frame in unreadable:
+                    self.assertIn(f"frame {frame}, cannot be decoded", ran.stderr)
+
+    def test_a_video_of_which_much_is_missing_says_so(self):
+        jpegs = self.pictures()[:20]
+        video = self.scratch / "v.avi"
+        video.write_bytes(motion_jpeg([*jpegs[:10], *[b"no image"] * 10]))
+        ran = loopbit("run", video, "--out", self.out, "--no-report")
+        self.assertEqual((ran.returncode, len(rows(self.out))), (0, 10))
+        self.assertEqual(complaints(ran), [f"loopbit: Video '{video}' ends after 10 of about 20 frames: copy it "
+                                           "again or convert it."])
+
+    def test_a_video_that_is_cut_off_says_so(self):
+        jpegs = self.pictures()[:20]
+        video = self.scratch / "v.avi"
+        whole = motion_jpeg(jpegs)
         for name, size in {"whole": len(whole), "cut": len(whole) // 2}.items():
             with self.subTest(name):
                 video.write_bytes(whole[:size])
@@ -616,6 +646,47 @@ class CommandLineTest(CommandTest):
         empty = self.scratch / "empty"
         empty.mkdir()
         self.assert_fails(loopbit("run", empty, "--out", self.out), 3, empty)
+
+    def test_what_is_read_is_never_replaced(self):
+        def copy(name):
+            return pathlib.Path(shutil.copy(self.dataset / name, self.scratch))
+
+        truth, image = copy("truth.csv"), self.few_images(3) / "000001.png"
+        run, map_file = self.scratch / "run", self.scratch / "map.db"
+        shutil.copytree(self.reference, run)
+        loopbit("run", image.parent, "--map", map_file, "--out", self.out, "--no-report")
+        few = ["run", image.parent, "--no-report", "--out", self.scratch / "new"]
+        for arguments, lost in [
+                ([*few, "--map", map_file, "--mcap-out"], map_file),
+                ([*few, "--truth", truth, "--mcap-out"], truth),
+                ([*few, "--mcap-out"], image),
+                (["run", image.parent, "--out", run, "--overwrite", "--mcap-out"], run / "loops.csv"),
+                (["map", "export", map_file, "--out"], map_file),
+                (["pairs", run, "--out"], run / "loops.csv"),
+                (["report", run, "--out"], run / "run.json"),
+                (["eval", run, "--truth", truth, "--plot"], truth),
+                (["compare", run, f"again={run}", "--out"], run / "run.json")]:
+            with self.subTest(arguments[0], lost=lost.name):
+                before = lost.read_bytes()
+                self.assert_fails(loopbit(*arguments, lost), 2, arguments[-1], lost, "name another file")
+                self.assertEqual(lost.read_bytes(), before)
+        self.assertFalse((self.scratch / "new").exists())
+        for page in (run / "report.html", run / "new.html"):
+            self.assertEqual(loopbit("report", run, "--out", page).returncode, 0)
+
+    def test_an_empty_value_is_no_value(self):
+        for arguments in (["run", ""], ["run", self.images, "--mask", ""], ["eval", self.reference, "--plot", ""],
+                          ["map", "check", "map.db", "--recover", ""]):
+            ran = loopbit(*arguments)
+            self.assertEqual(ran.returncode, 2)
+            self.assertIn("the value is empty", ran.stderr)
+
+    def test_a_data_set_replaces_no_file(self):
+        mine = self.scratch / "mine"
+        mine.mkdir()
+        (mine / "poses.txt").write_text("mine\n")
+        self.assert_fails(loopbit("demo", *WORLD, "--write-images", mine), 4, mine / "poses.txt", "another folder")
+        self.assertEqual([file.name for file in mine.iterdir()], ["poses.txt"])
 
     def test_input_that_is_no_video(self):
         text = self.scratch / "letter.doc"

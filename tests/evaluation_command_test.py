@@ -336,11 +336,21 @@ class EvaluationCommandTest(CommandTest):
         self.assert_fails(loopbit("eval", self.reference, "--plot", nowhere), 4, nowhere)
 
     def test_pairs_of_images_are_those_of_the_loops(self):
-        expected = "".join(f"{row['name']} {row['match_name']}\n" for row in rows(self.reference)
-                           if row["status"] == "loop")
-        self.assertEqual(loopbit("pairs", self.reference).stdout, expected)
+        loops = [row for row in rows(self.reference) if row["status"] == "loop"]
+        late = next(row for row in rows(self.reference) if row["status"] == "low_score")
+        last = len(rows(self.reference)) - 1
+        run = self.scratch / "run"
+        run.mkdir()
+        shutil.copy(self.reference / "loops.csv", run)
+        (run / "late_loops.csv").write_text(
+            "frame,kind,match,score,similarity,reported_at,name,match_name\n"
+            f"{late['frame']},late,0,0.99,0.5,{last},{late['name']},000000.png\n"
+            f"{loops[0]['frame']},withdrawn,{loops[0]['match']},0.1,0.5,{last},,\n")
+        expected = "".join(f"{query} {match}\n" for query, match in [
+            *[(row["name"], row["match_name"]) for row in loops[1:]], (late["name"], "000000.png")])
+        self.assertEqual(loopbit("pairs", run).stdout, expected)
         pairs = self.scratch / "pairs.txt"
-        self.assertEqual(loopbit("pairs", self.reference, "--out", pairs).returncode, 0)
+        self.assertEqual(loopbit("pairs", run, "--out", pairs).returncode, 0)
         self.assertEqual(pairs.read_text(), expected)
 
     def test_pairs_need_names_that_a_list_can_hold(self):
@@ -356,6 +366,14 @@ class EvaluationCommandTest(CommandTest):
                 changed = [",".join(row) for row in cells]
                 (run / "loops.csv").write_text("\n".join([header, *changed, ""]))
                 self.assert_fails(loopbit("pairs", run), 3, f"Frame {loop['match']}", f"'{name}'")
+
+    def test_a_run_that_lost_rows_is_refused(self):
+        run = self.scratch / "run"
+        shutil.copytree(self.reference, run)
+        lines = (run / "loops.csv").read_text().splitlines(keepends=True)
+        (run / "loops.csv").write_text("".join(lines[:30]))
+        for command in ("eval", "report", "pairs"):
+            self.assert_fails(loopbit(command, run), 3, f"{run}/loops.csv' has 29 rows", f"counts {len(lines) - 1}")
 
     def test_runs_that_cannot_be_compared(self):
         short = self.scratch / "short"

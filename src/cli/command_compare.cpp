@@ -191,7 +191,10 @@ void add_compare(CLI::App& app) {
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
   command->footer(list_truth_settings());
-  command->callback([flags] { compare_command(*flags); });
+  command->callback([command, flags] {
+    protect_inputs(*command, {"--out", "--plot"});
+    compare_command(*flags);
+  });
 }
 
 }  // namespace loopbit::cli

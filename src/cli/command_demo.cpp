@@ -63,7 +63,7 @@ void write_images(const World& world, const std::string& folder, bool quiet) {
   if (quiet) return;
   fmt::print(
       "written    {0}/images ({1} frames of the {2}), {0}/truth.csv, {0}/not_false.csv, "
-      "{0}/poses.txt, {0}/odometry.txt, {0}/times.txt\n",
+      "{0}/poses.txt, {0}/odometry.txt, {0}/times.txt, {0}/camera.yaml\n",
       folder, world.options().frames, describe(world));
 }
 
@@ -120,10 +120,12 @@ void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
       [&](CLI::Option* option) { return option != out && !option->check_name("--quiet"); });
   command->add_option("--frames", flags->world.frames, "Frames in the whole drive")
       ->type_name("N")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(whole_number(1, 10'000'000));
   command->add_option("--seed", flags->world.seed, "Random seed of the town")
       ->type_name("S")
-      ->capture_default_str();
+      ->capture_default_str()
+      ->check(whole_number(0, 2'147'483'647));
   command->add_option("--world", flags->world_settings, "One setting of the world; may be repeated")
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
@@ -133,8 +135,10 @@ void add_demo(CLI::App& app, const Arguments& arguments, int& exit_code) {
       ->type_name("DIR")
       ->excludes(out);
   flags->truth.add_to(*command);
-  command->callback(
-      [flags, &arguments, &exit_code] { exit_code = demo_command(*flags, arguments); });
+  command->callback([command, flags, &arguments, &exit_code] {
+    protect_inputs(*command, {"--mcap-out"});
+    exit_code = demo_command(*flags, arguments);
+  });
 }
 
 }  // namespace loopbit::cli

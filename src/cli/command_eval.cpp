@@ -131,7 +131,10 @@ void add_eval(CLI::App& app) {
   add_plot_flag(*command, flags->plot);
   command->add_flag("--json", flags->json, "Print all numbers, wrong loops and the curve as JSON");
   command->footer(list_truth_settings());
-  command->callback([flags] { eval_command(*flags); });
+  command->callback([command, flags] {
+    protect_inputs(*command, {"--plot"});
+    eval_command(*flags);
+  });
 }
 
 }  // namespace loopbit::cli

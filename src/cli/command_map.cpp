@@ -218,6 +218,12 @@ int link_command(const std::string& path) {
   return interrupted;
 }
 
+const std::map<std::string, ExportFormat>& export_formats() {
+  static const std::map<std::string, ExportFormat> formats{
+      {"csv", ExportFormat::csv}, {"json", ExportFormat::json}, {"g2o", ExportFormat::g2o}};
+  return formats;
+}
+
 void export_command(const std::string& path, ExportFormat format, const std::string& out) {
   MapReader map(path);
   print_or_write(export_loops(map, format), out);
@@ -287,7 +293,7 @@ struct MapFlags {
   std::vector<std::string> others;
   std::string to;
   std::vector<int> sessions;
-  ExportFormat format = ExportFormat::csv;
+  std::string format = "csv";
   std::string out;
   std::string recover;
   int first_session = 1;
@@ -316,14 +322,15 @@ void add_readers(CLI::App& map, const Flags& flags, int& exit_code) {
   list->callback([flags, &exit_code] { exit_code = list_command(flags->map, flags->json); });
 
   CLI::App* export_loops = add_command(map, flags, "export", "Export the loops");
-  const std::map<std::string, ExportFormat> formats{
-      {"csv", ExportFormat::csv}, {"json", ExportFormat::json}, {"g2o", ExportFormat::g2o}};
   export_loops->add_option("--format", flags->format, "csv (default), json or g2o")
       ->type_name("FORMAT")
-      ->transform(CLI::CheckedTransformer(formats));
+      ->check(CLI::IsMember(export_formats()));
   export_loops->add_option("--out", flags->out, "Output file; default: standard output")
       ->type_name("FILE");
-  export_loops->callback([flags] { export_command(flags->map, flags->format, flags->out); });
+  export_loops->callback([export_loops, flags] {
+    protect_inputs(*export_loops, {"--out"});
+    export_command(flags->map, export_formats().at(flags->format), flags->out);
+  });
 
   CLI::App* images =
       add_command(map, flags, "images", "Write the images stored by 'loopbit run --keep-images'");
@@ -369,7 +376,8 @@ void add_writers(CLI::App& map, const Flags& flags, int& exit_code) {
   move->add_option("--session", flags->sessions, "A session to move; may be repeated")
       ->type_name("SESSION")
       ->allow_extra_args(false)
-      ->required();
+      ->required()
+      ->check(whole_number(1, 2'000'000'000));
   move->callback([flags] { move_command(flags->map, flags->to, flags->sessions); });
 
   CLI::App* link = add_command(map, flags, "link",
@@ -381,7 +389,8 @@ void add_writers(CLI::App& map, const Flags& flags, int& exit_code) {
       add_command(map, flags, "compact", "Drop sessions, redundant places or images");
   compact->add_option("--drop", flags->compact.drop_sessions, "A session to drop; may be repeated")
       ->type_name("SESSION")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->check(whole_number(1, 2'000'000'000));
   compact
       ->add_option("--budget", flags->compact.max_places,
                    "Keep at most this many places; the most redundant are dropped first")

@@ -29,7 +29,10 @@ void add_pairs(CLI::App& app) {
   command->add_option("RUN", flags->run, "A run folder")->required();
   command->add_option("--out", flags->out, "Output file; default: standard output")
       ->type_name("FILE");
-  command->callback([flags] { pairs_command(*flags); });
+  command->callback([command, flags] {
+    protect_inputs(*command, {"--out"});
+    pairs_command(*flags);
+  });
 }
 
 }  // namespace loopbit::cli

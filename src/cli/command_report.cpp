@@ -60,7 +60,10 @@ void add_report(CLI::App& app) {
   flags->truth.add_to(*command);
   flags->truth.add_poses_to(*command);
   command->footer(list_truth_settings());
-  command->callback([flags] { report_command(*flags); });
+  command->callback([command, flags] {
+    protect_inputs(*command, {"--out"});
+    report_command(*flags);
+  });
 }
 
 }  // namespace loopbit::cli

@@ -200,8 +200,10 @@ void add_run(CLI::App& app, const Arguments& arguments, int& exit_code) {
   add_camera_flags(*command, *flags);
   add_odometry_flags(*command, *flags);
   command->footer(list_truth_settings());
-  command->callback(
-      [flags, &arguments, &exit_code] { exit_code = run_command(*flags, arguments); });
+  command->callback([command, flags, &arguments, &exit_code] {
+    protect_inputs(*command, {"--mcap-out"});
+    exit_code = run_command(*flags, arguments);
+  });
 }
 
 }  // namespace loopbit::cli

@@ -2,11 +2,15 @@
 // SPDX-License-Identifier: MIT
 #include "commands.hpp"
 
+#include <filesystem>
 #include <memory>
+#include <system_error>
 
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/finished_run.hpp"
+#include "loopbit/image_file.hpp"
 #include "loopbit/loop_detector_options.hpp"
 
 namespace loopbit::cli {
@@ -23,7 +27,49 @@ CLI::Validator range(Number min, Number max, const char* type, const char* kind)
   return {check, fmt::format("{} in [{} - {}]", type, min, max)};
 }
 
+namespace fs = std::filesystem;
+
+/// Whether writing `file` would replace `input` or what a command reads in that folder.
+bool would_replace(const fs::path& file, const fs::path& input) {
+  std::error_code error;
+  if (fs::equivalent(file, input, error)) return true;
+  if (!fs::is_regular_file(file, error)) return false;
+  const std::string name = file.filename().string();
+  if (!images::is_image_name(name) && (!is_run_file(name) || name == "report.html")) return false;
+  const fs::path folder = fs::absolute(file).parent_path();
+  return fs::equivalent(folder, input, error) || fs::equivalent(folder.parent_path(), input, error);
+}
+
 }  // namespace
+
+void protect_inputs(const CLI::App& command, const std::vector<std::string>& outputs) {
+  for (const std::string& output : outputs) {
+    const CLI::Option* written = command.get_option(output);
+    if (written->count() == 0) continue;
+    const std::string& file = written->results().front();
+    for (const CLI::Option* option : command.get_options()) {
+      if (option == written) continue;
+      for (const std::string& value : option->results()) {
+        const std::string path = value.substr(value.find('=') + 1);  // of NAME=PATH
+        if (value != file && !would_replace(file, value) && !would_replace(file, path)) continue;
+        throw Error(ErrorKind::option,
+                    fmt::format("{} '{}' would replace what {} '{}' names; name another file.",
+                                output, file, option->get_name(), without_secrets(value)));
+      }
+    }
+  }
+}
+
+void refuse_empty_values(CLI::App& app) {
+  const auto check = [](const std::string& value) {
+    return value.empty() ? std::string("the value is empty; give one, or leave the option out")
+                         : std::string();
+  };
+  for (CLI::Option* option : app.get_options()) {
+    if (option->get_items_expected_max() > 0) option->check(CLI::Validator(check, ""));
+  }
+  for (CLI::App* command : app.get_subcommands({})) refuse_empty_values(*command);
+}
 
 void add_options(CLI::App& app) {
   auto as_json = std::make_shared<bool>(false);

@@ -41,6 +41,14 @@ void add_report(CLI::App& app);
 void add_topics(CLI::App& app);
 void add_options(CLI::App& app);
 
+/// Throws Error (kind option) if the file that one of the options `outputs` names would replace
+/// what `command` reads: the value of another option, or in such a folder a file of a run or an
+/// image. A run's page may be replaced.
+void protect_inputs(const CLI::App& command, const std::vector<std::string>& outputs);
+
+/// Makes options of `app` and its commands refuse an empty value, as an unset shell variable gives.
+void refuse_empty_values(CLI::App& app);
+
 /// "NAME=VALUE" in two. Throws Error (kind option) without a "=".
 std::pair<std::string, std::string> split_setting(const std::string& text);
 

@@ -122,6 +122,7 @@ int run_command_line(int argc, char** argv) {
   cli::add_report(app);
   cli::add_topics(app);
   cli::add_options(app);
+  cli::refuse_empty_values(app);
   check_command(app, "loopbit", 1, argc, argv);
   try {
     app.parse(argc, argv);

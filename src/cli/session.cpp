@@ -40,16 +40,11 @@ int thread_count(int wanted) {
   return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
-/// Throws Error if the file of --mcap-out is the input, or its folder is not there: a run may be
-/// long.
-void check_mcap_out(const SessionFlags& flags, const std::string& input) {
+/// Throws Error if the folder of --mcap-out is not there: a run may be long.
+void check_mcap_out(const SessionFlags& flags) {
   if (flags.mcap_out.empty()) return;
   const fs::path file = fs::absolute(flags.mcap_out);
   std::error_code error;
-  if (fs::equivalent(file, input, error)) {
-    throw Error(ErrorKind::option,
-                fmt::format("--mcap-out '{}' is the input; name another file.", flags.mcap_out));
-  }
   if (fs::is_directory(file, error)) throw cannot_write(flags.mcap_out, EISDIR);
   if (!fs::is_directory(file.parent_path(), error)) throw cannot_write(flags.mcap_out, ENOENT);
 }
@@ -148,8 +143,9 @@ void SessionFlags::add_to(CLI::App& command) {
       ->type_name("NAME=VALUE")
       ->allow_extra_args(false);
   command
-      .add_option("--threads", threads,
-                  "Threads, at most one per core; 0 = one per core. Results do not depend on it")
+      .add_option(
+          "--threads", threads,
+          "Threads, at most one per core; 0 (default) = one per core. Results do not depend on it")
       ->type_name("N")
       ->check(whole_number(0, 1024));
   CLI::Option* left_out = command.add_flag_callback(
@@ -185,7 +181,7 @@ void SessionFlags::add_to(CLI::App& command) {
   command.add_flag("--json", json,
                    "Print one JSON object per loop, one per line, as soon as it is found, and a "
                    "summary as the last line");
-  command.add_flag("--quiet", quiet, "Print no progress and no summary; errors still");
+  command.add_flag("--quiet", quiet, "Print no progress and no summary; errors are still printed");
 }
 
 void add_map_cache_flag(CLI::App& command, std::size_t& cache_mb) {
@@ -250,7 +246,7 @@ int run_session(std::unique_ptr<ImageSource> source, const std::string& input,
   if (request.threads > 1) source = prefetch(std::move(source), kFramesReadAhead);
   RunInput frames(std::move(source), input, sampling);
   if (flags.found_camera) drop_other_camera(request, frames);
-  check_mcap_out(flags, input);
+  check_mcap_out(flags);
   const std::unique_ptr<LivePage> live = open_live_page(flags);
   const RunOutcome outcome = run_with_progress(frames, flags, live.get(), stop);
   if (!outcome.record.early_end.empty()) {

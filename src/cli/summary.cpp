@@ -53,7 +53,7 @@ void print_reasons(const std::vector<Detection>& detections) {
   constexpr std::pair<Status, const char*> kReasons[] = {
       {Status::no_earlier_place, "only recent places to compare with"},
       {Status::no_similar_place, "no earlier place looks similar"},
-      {Status::few_matches, "no candidate shares enough features"},
+      {Status::few_matches, "the best candidate shares too few features"},
       {Status::no_geometry, "features match, but not as one rigid scene"},
       {Status::low_score, "geometry found, but too little evidence"},
       {Status::ambiguous, "enough evidence, but other places share it"},

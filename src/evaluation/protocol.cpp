@@ -44,11 +44,10 @@ const Protocol& find_protocol(const std::string& name) {
   const auto found =
       std::find_if(all.begin(), all.end(), [&](const auto& p) { return p.name == name; });
   if (found != all.end()) return *found;
-  std::string names;
-  for (const Protocol& protocol : all)
-    names += fmt::format("\n  {:<10} {}", protocol.name, protocol.help);
-  throw Error(ErrorKind::option,
-              fmt::format("There is no protocol '{}'; the protocols are:{}", name, names));
+  std::vector<std::string_view> names;
+  for (const Protocol& protocol : all) names.push_back(protocol.name);
+  throw Error(ErrorKind::option, fmt::format("There is no protocol '{}'; the protocols are {}.",
+                                             name, fmt::join(names, ", ")));
 }
 
 }  // namespace loopbit

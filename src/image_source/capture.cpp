@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "capture.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -23,6 +25,21 @@ namespace {
 /// grab, FFMPEG tells the time of the frame before, and 0 for each of the first two.
 double position_ms(const cv::VideoCapture& capture) { return capture.get(cv::CAP_PROP_POS_MSEC); }
 
+/// After so many frames in a row that cannot be read, a video has ended.
+constexpr std::size_t kMostDamaged = 100;
+/// The number of frames that a container tells is sometimes an estimate: if fewer than this share
+/// of them can be read, some are missing.
+constexpr double kMinReadable = 0.9;
+
+/// Grabs the next frame that can be read, at most `most` frames further on. Returns how many cannot
+/// be read before it; none at the end.
+std::optional<std::size_t> grab_readable(cv::VideoCapture& capture, std::size_t most) {
+  for (std::size_t damaged = 0; damaged <= most; ++damaged) {
+    if (capture.grab()) return damaged;
+  }
+  return std::nullopt;
+}
+
 class CaptureSource final : public ImageSource {
  public:
   struct Facts {
@@ -30,6 +47,7 @@ class CaptureSource final : public ImageSource {
     bool has_times = false;
     std::optional<std::size_t> size;
     std::string early_end = {};  ///< as ImageSource::early_end() at the end
+    std::string file = {};       ///< of a video
   };
 
   /// Shares `capture`, which is a handle.
@@ -38,8 +56,10 @@ class CaptureSource final : public ImageSource {
 
   bool next(Frame& frame) override {
     if (!skip()) return false;
-    frame = Frame{fmt::format("frame {}", grabbed_ - 1), timestamp_s(), {}, {}};
+    frame = Frame{fmt::format("frame {}", passed_ - 1), {}, {}, {}};
     try {
+      if (damaged_before_ > 0) fail(frame.name);
+      frame.timestamp_s = timestamp_s();
       frame.image = retrieve(frame.name);
     } catch (const Error& e) {
       frame.error = e.what();
@@ -48,12 +68,12 @@ class CaptureSource final : public ImageSource {
   }
 
   bool skip() override {
-    if (ended_ || !capture_.grab()) {
-      ended_ = true;
+    if (damaged_before_ > 0) {
+      --damaged_before_;
+    } else if (!grab()) {
       return false;
     }
-    if (grabbed_ == 0) first_ms_ = position_ms(capture_);
-    ++grabbed_;
+    ++passed_;
     return true;
   }
 
@@ -61,30 +81,55 @@ class CaptureSource final : public ImageSource {
 
   [[nodiscard]] std::string description() const override { return facts_.description; }
 
-  [[nodiscard]] std::string early_end() const override { return ended_ ? facts_.early_end : ""; }
+  [[nodiscard]] std::string early_end() const override {
+    if (!ended_ || !facts_.early_end.empty()) return ended_ ? facts_.early_end : "";
+    const std::size_t expected = facts_.size.value_or(0);
+    if (static_cast<double>(passed_) >= kMinReadable * static_cast<double>(expected)) return {};
+    return fmt::format("Video '{}' ends after {} of about {} frames: copy it again or convert it.",
+                       facts_.file, passed_, expected);
+  }
 
  private:
+  /// Grabs a frame, and finds how many before it are damaged. Of a camera, none are.
+  bool grab() {
+    const std::size_t expected = facts_.size.value_or(0);
+    const std::size_t left = expected > passed_ ? expected - passed_ - 1 : 0;
+    const auto damaged =
+        ended_ ? std::nullopt : grab_readable(capture_, std::min(left, kMostDamaged));
+    ended_ = !damaged;
+    if (ended_) return false;
+    damaged_before_ = *damaged;
+    if (!first_ms_) first_ms_ = position_ms(capture_);
+    return true;
+  }
+
   [[nodiscard]] std::optional<double> timestamp_s() const {
     if (!facts_.has_times) return std::nullopt;
-    return (position_ms(capture_) - first_ms_) / 1000.0;
+    return (position_ms(capture_) - *first_ms_) / 1000.0;
+  }
+
+  [[nodiscard]] std::string thing(const std::string& name) const {
+    return fmt::format("{}, {},", facts_.description, name);
+  }
+
+  [[noreturn]] void fail(const std::string& name) const {
+    throw Error(ErrorKind::input,
+                thing(name) + " cannot be decoded: convert the video or leave it out.");
   }
 
   cv::Mat retrieve(const std::string& name) {
-    const std::string thing = fmt::format("{}, {},", facts_.description, name);
     cv::Mat image;
-    if (!capture_.retrieve(image) || image.empty()) {
-      throw Error(ErrorKind::input,
-                  thing + " cannot be decoded: convert the video or leave it out.");
-    }
-    check_pixel_format(image, thing);
+    if (!capture_.retrieve(image) || image.empty()) fail(name);
+    check_pixel_format(image, thing(name));
     return image;
   }
 
   cv::VideoCapture capture_;
   Facts facts_;
-  std::size_t grabbed_ = 0;
+  std::size_t passed_ = 0;          ///< frames, the present one included
+  std::size_t damaged_before_ = 0;  ///< frames from the present one to the one grabbed
   bool ended_ = false;
-  double first_ms_ = 0.0;
+  std::optional<double> first_ms_;  ///< position of the first frame grabbed
 };
 
 /// The backends that read files. cv::CAP_ANY would also ask the drivers of attached cameras, and
@@ -107,13 +152,13 @@ cv::VideoCapture open_file(const std::filesystem::path& file) {
 
 /// Some backends report 0 for every frame. Looks at the first two frames, which are then gone.
 bool has_times(cv::VideoCapture& capture, const std::filesystem::path& file) {
-  if (!capture.grab()) {
+  if (!grab_readable(capture, kMostDamaged)) {
     throw Error(ErrorKind::input,
                 fmt::format("Video '{}' has no readable frame: copy it again or convert it.",
                             file.string()));
   }
   const double first_ms = position_ms(capture);
-  return capture.grab() && position_ms(capture) > first_ms;
+  return grab_readable(capture, kMostDamaged) && position_ms(capture) > first_ms;
 }
 
 std::optional<std::size_t> frame_count(const cv::VideoCapture& capture) {
@@ -143,7 +188,8 @@ std::unique_ptr<ImageSource> open_video(const std::filesystem::path& file, int m
                     static_cast<std::int64_t>(probe.get(cv::CAP_PROP_FRAME_HEIGHT)), max_megapixels,
                     fmt::format("Video '{}'", file.string()));
   CaptureSource::Facts facts{fmt::format("video {}", file.filename().string()),
-                             has_times(probe, file), frame_count(probe), early_end(file)};
+                             has_times(probe, file), frame_count(probe), early_end(file),
+                             file.string()};
   return std::make_unique<CaptureSource>(open_file(file), std::move(facts));
 }
 

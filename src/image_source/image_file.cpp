@@ -41,7 +41,7 @@ std::size_t checked_size(const fs::path& file) {
   const fs::file_status status = fs::status(file, error);
   if (!fs::exists(status)) {
     fail(image_thing(file),
-         fmt::format("cannot be found ({}): restore it or take it off the list", error.message()));
+         fmt::format("cannot be found ({}): restore it, or name another file", error.message()));
   }
   if (!fs::is_regular_file(status)) {
     fail(image_thing(file), "is a folder, a pipe or a device: name an image file");

@@ -250,11 +250,11 @@ class LivePage::Impl {
     if (bound > 0) return bound;
     throw Error(
         ErrorKind::option,
-        fmt::format("The live page cannot be served on {} port {}{}; choose another port, "
-                    "or 0 for any that is free.",
-                    address, port,
-                    errno != 0 ? fmt::format(" ({})", std::generic_category().message(errno))
-                               : ", which is no address of this machine"));
+        fmt::format("The live page cannot be served on {} port {}{}.", address, port,
+                    errno != 0
+                        ? fmt::format(" ({}); choose another port, or 0 for any that is free",
+                                      std::generic_category().message(errno))
+                        : ", which is no address of this machine; choose another one"));
   }
 
   void show_page(httplib::Response& response) {

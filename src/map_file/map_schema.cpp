@@ -107,6 +107,9 @@ void check_tables(const Database& database, int version) {
     const auto is_this = [&](const Table& table) {
       return table.since <= version && name == table.name && sql == table.definition;
     };
+    // SQLite fills up a page that was cut in two with zeros.
+    if (name.empty())
+      refuse(database, "is damaged where it lists its tables; use a copy from before");
     if (!is_this(kSequences) && std::none_of(kMapTables.begin(), kMapTables.end(), is_this)) {
       refuse(database, fmt::format("has a table '{}' that no map of version {} has: it was changed "
                                    "by something else; use a copy from before",

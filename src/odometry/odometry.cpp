@@ -84,9 +84,10 @@ void check_odometry(const OdometryPose& pose, const std::string& name) {
                             name));
   }
   if (!is_valid(pose)) {
-    throw Error(ErrorKind::input, fmt::format("The covariance of {} is not positive definite: give "
-                                              "a symmetric one of (x, y, z, rx, ry, rz), or none.",
-                                              name));
+    throw Error(ErrorKind::input,
+                fmt::format("{} has a covariance that is not positive definite: "
+                            "give a symmetric one of (x, y, z, rx, ry, rz), or none.",
+                            name));
   }
 }
 

@@ -28,6 +28,7 @@ DatabaseTopics read_topics(const Database& database) {
   DatabaseTopics topics;
   Statement rows(database, "SELECT id, name, type, serialization_format FROM topics");
   while (rows.step_if_readable() == Statement::Step::row) {
+    if (rows.text(1).empty()) continue;  // of a page that was cut in two
     const Encoding encoding = rows.text(3) == "cdr" ? Encoding::cdr : Encoding::other;
     topics.try_emplace(rows.integer(0), Channel{rows.text(1), rows.text(2), encoding});
   }

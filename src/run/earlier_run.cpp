@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "earlier_run.hpp"
 
+#include <algorithm>
 #include <system_error>
 #include <utility>
 
@@ -9,6 +10,7 @@
 
 #include "loopbit/database.hpp"
 #include "loopbit/error.hpp"
+#include "loopbit/finished_run.hpp"
 #include "loopbit/read_file.hpp"
 #include "loopbit/run_record.hpp"
 #include "loopbit/write_file.hpp"
@@ -109,6 +111,11 @@ void rename_folder(const fs::path& from, const fs::path& to) {
 }
 
 }  // namespace
+
+bool is_run_file(const std::string& name) {
+  const std::vector<std::string> names = files_of_a_run();
+  return std::ranges::find(names, name) != names.end();
+}
 
 EarlierRun::EarlierRun(fs::path folder, bool overwrite, const std::vector<std::string>& inputs)
     : folder_(std::move(folder)),

@@ -259,6 +259,19 @@ void read_correction(const fs::path& folder, FinishedRun& run) {
   }
 }
 
+/// Throws Error (kind input) if the run has ended, but loops.csv has not a row for each frame.
+void check_all_frames_are_there(const FinishedRun& run) {
+  const RunRecord& record = *run.record;
+  if (!record.has_ended() || !record.results) return;
+  const auto expected = static_cast<std::size_t>(record.results->frames);
+  if (run.detections.size() == expected) return;
+  throw Error(ErrorKind::input,
+              fmt::format("'{}' has {} rows, but {} counts {} frames: it was cut off or changed; "
+                          "copy it again, or repeat the run.",
+                          (fs::path(run.path) / kLoopsFile).string(), run.detections.size(),
+                          kRecordFile, expected));
+}
+
 }  // namespace
 
 std::vector<Detection> read_detections(const std::string& path) {
@@ -288,6 +301,7 @@ FinishedRun read_run(const std::string& path) {
     const std::string file = (folder / kRecordFile).string();
     run.record_json = read_text(file);
     run.record = run_record_from_json(run.record_json, file);
+    check_all_frames_are_there(run);
   }
   if (is_there(folder / kTruthFile)) {
     run.truth = {.same_place = read_place_runs((folder / kTruthFile).string()),
@@ -358,15 +372,14 @@ std::string image_pairs(const std::vector<Detection>& detections) {
         name.find("\\x") != std::string::npos) {
       throw Error(ErrorKind::input,
                   fmt::format("Frame {} is called '{}', but a list of pairs needs a name without "
-                              "spaces, commas and quotes: rename the image, and run again.",
+                              "spaces, commas and quotes: run on image files with such names.",
                               frame, name));
     }
     return name;
   };
   std::string text;
-  for (const Detection& d : detections) {
-    if (d.status != Status::loop || !d.match) continue;
-    text += fmt::format("{} {}\n", name_of(d.frame), name_of(*d.match));
+  for (const ReportedMatch& loop : with_changes(match_list(detections)).matches) {
+    if (loop.is_loop) text += fmt::format("{} {}\n", name_of(loop.query), name_of(loop.match));
   }
   return text;
 }

@@ -80,7 +80,8 @@ def test_finished_run(run):
     assert array["match_name"][0] == ""
     assert loops["match_name"].tolist() == [f"{match:06}.png" for match in loops["match"]]
     pairs = [line.split() for line in loopbit.image_pairs(run.detections).splitlines()]
-    assert pairs == [[row["name"], row["match_name"]] for row in loops]
+    late = [[f"{loop.frame:06}.png", f"{loop.match:06}.png"] for d in run.detections for loop in d.late_loops]
+    assert pairs == [[row["name"], row["match_name"]] for row in loops] + late
 
 
 def test_callbacks(dataset, images, tmp_path):

@@ -168,7 +168,7 @@ def test_impossible_files_are_refused_before_the_run(tmp_path):
     images = tmp_path / "images.txt"
     images.write_text("1.png\n")
     for arguments, code, text in [
-            (["run", images, "--mcap-out", images], 2, "is the input"),
+            (["run", images, "--mcap-out", images], 2, "would replace what INPUT"),
             (["demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", tmp_path / "none/out.mcap"], 4,
              "No such file or directory"),
             (["demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", tmp_path], 4, "Is a directory")]:

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <filesystem>
@@ -62,6 +63,20 @@ class WorldSource final : public ImageSource {
   std::vector<OdometryPose> odometry_;
   int frame_ = 0;
 };
+
+constexpr std::array kFiles = {"times.txt",   "poses.txt", "odometry.txt",
+                               "camera.yaml", "truth.csv", "not_false.csv"};
+
+/// Throws Error (kind output) if the folder has a file that a data set would replace.
+void check_no_file_is_lost(const fs::path& folder) {
+  for (const char* name : kFiles) {
+    std::error_code error;
+    if (!fs::exists(folder / name, error)) continue;
+    throw Error(ErrorKind::output, fmt::format("'{}' is there already; name another folder for "
+                                               "the data set.",
+                                               (folder / name).string()));
+  }
+}
 
 void make_image_folder(const fs::path& images) {
   std::error_code error;
@@ -133,6 +148,7 @@ void write_dataset(const World& world, const std::string& folder,
                    const std::function<void(int)>& on_frame) {
   const fs::path root = folder;
   const int frames = world.options().frames;
+  check_no_file_is_lost(root);
   make_image_folder(root / "images");
   for (int frame = 0; frame < frames; ++frame) {
     write_image(root / "images" / fmt::format("{:06}.png", frame), world.render(frame));

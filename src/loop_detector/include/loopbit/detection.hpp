@@ -18,7 +18,7 @@ enum class Status {
   loop,              ///< the match is accepted: the camera has been here before
   no_earlier_place,  ///< all places so far are too recent to be candidates
   no_similar_place,  ///< no earlier place looks similar, so there is no candidate
-  few_matches,       ///< no candidate shares enough features with the query
+  few_matches,       ///< the best candidate shares too few features with the query
   no_geometry,       ///< no epipolar geometry explains enough of the matches
   low_score,         ///< the evidence is too weak to accept the match
   ambiguous,         ///< enough evidence, but similar-looking places share it

@@ -86,7 +86,8 @@ inline constexpr std::size_t kMapCache_mb = 64;
 
 /// Reads a map on disk, also while a MapWriter writes it: each call sees what is committed by then.
 /// docs/format.md describes the file. Every row has a checksum; damaged rows are left out. A map
-/// may have any number of readers. Not thread-safe.
+/// may have any number of readers. A reader serves the queries of one LoopDetector: for a second
+/// one, and in add(), remove() and reject(), it throws Error (kind option). Not thread-safe.
 class MapReader : public MapStorage {
  public:
   using VisitPlace = std::function<void(const MapPlace&)>;
@@ -163,8 +164,6 @@ class MapReader : public MapStorage {
 
   void check_options(const LoopDetectorOptions& options) override;
   std::int64_t epoch() override;
-  /// A reader serves the queries of one LoopDetector. A second one, add(), remove() and reject()
-  /// throw Error (kind option).
   /// Of a map on a server that has the extension and its index. Without it, and of a file, null.
   PlaceSearch* place_search() override;
   void for_each_earlier_place(const Visit& visit) override;

@@ -63,15 +63,19 @@ struct FinishedRun {
   [[nodiscard]] Scoring scoring() const;
 };
 
-/// Reads a run folder, also of an interrupted run. Throws Error (kind input) if `path` has no run
-/// or one of its files is malformed.
+/// Whether a run writes a file of this name, without a folder.
+bool is_run_file(const std::string& name);
+
+/// Reads a run folder, also of an interrupted run. Throws Error (kind input) if `path` has no run,
+/// one of its files is malformed, or a run that has ended lacks frames.
 FinishedRun read_run(const std::string& path);
 
 /// Converts detections to a MatchList.
 MatchList match_list(const std::vector<Detection>& detections);
 
 /// The loops within this session as lines "NAME MATCH_NAME" with names of images, the form in which
-/// hloc and COLMAP read pairs. Throws Error (kind input) if a name cannot stand in such a line.
+/// hloc and COLMAP read pairs: also those found late, without those withdrawn. Throws Error (kind
+/// input) if a name cannot stand in such a line.
 std::string image_pairs(const std::vector<Detection>& detections);
 
 }  // namespace loopbit
