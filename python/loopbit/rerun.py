@@ -8,7 +8,7 @@
     rerun.init("loopbit", spawn=True)
     loopbit.rerun.log(loopbit.read_run("town_loops"))
 
-Needs Rerun's SDK: ``pip install loopbit[rerun]``.
+Needs Rerun's SDK: ``pip install '.[rerun]'`` in the source tree.
 """
 
 from __future__ import annotations
