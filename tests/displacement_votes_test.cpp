@@ -166,7 +166,7 @@ TEST(InlierWorth, FallsWithWhatTheViewSharesWithTheStepBefore) {
 
 TEST(CandidateGeometry, EvidenceIsDistinctInliersThatCountInFull) {
   const CandidateGeometry geometry{.matches = 99,
-                                   .inliers = 60,
+                                   .inliers = std::vector<Match>(60),
                                    .distinct_inliers = 40,
                                    .inlier_worth = 0.5,
                                    .distinctness = 0.25};

@@ -36,8 +36,10 @@ inline VerifiedCandidate candidate(std::ptrdiff_t step, Found found) {
     c.votes.apart = Displacements(bins);
   }
   if (found.inliers >= 0) {
-    c.geometry = CandidateGeometry{
-        .matches = 100, .inliers = found.inliers, .distinct_inliers = found.inliers};
+    c.geometry =
+        CandidateGeometry{.matches = 100,
+                          .inliers = std::vector<Match>(static_cast<std::size_t>(found.inliers)),
+                          .distinct_inliers = found.inliers};
   }
   return c;
 }

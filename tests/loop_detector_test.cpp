@@ -344,6 +344,24 @@ TEST(LoopDetector, AMaskThatExcludesNothingChangesNothing) {
   for (std::size_t i = 0; i < images.size(); ++i) expect_same_answer(without[i], expected[i]);
 }
 
+TEST(LoopDetector, FeaturesMustBeWhole) {
+  const Features whole = extract_surf(view(1));
+  std::vector<Features> broken(4, whole);
+  broken[0].num_dark = whole.keypoints.size() + 1;
+  broken[1].keypoints.pop_back();
+  broken[2].working_size_px = {};
+  broken[3].keypoints.resize(40000);
+  broken[3].descriptors.resize(40000);
+  LoopDetector detector(fast_options());
+  for (const Features& features : broken) {
+    expect_error(ErrorKind::input, {"keypoints", "not whole"},
+                 [&] { detector.process(BinaryContent{}, features); });
+  }
+  EXPECT_EQ(detector.size(), 0);
+  detector.process(BinaryContent{}, whole);
+  EXPECT_EQ(detector.size(), 1);
+}
+
 TEST(LoopDetector, AMaskThatDoesNotFitIsRefused) {
   LoopDetector detector(fast_options());
   expect_error(ErrorKind::option, {"0 everywhere"},

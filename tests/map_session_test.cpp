@@ -3,6 +3,7 @@
 // A detector with a map: sessions, and what may not depend on there being one.
 #include <functional>
 #include <initializer_list>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@
 
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_tools.hpp"
+#include "loopbit/surf.hpp"
 
 #include "map_support.hpp"
 #include "test_support.hpp"
@@ -311,6 +313,28 @@ TEST_F(MapSession, FeaturesFoundLostDuringASessionAreTold) {
   ASSERT_EQ(map->damage().size(), 1U);
   EXPECT_NE(map->damage()[0].find("place 8 (session 1, frame 7)"), std::string::npos);
   EXPECT_EQ(MapReader(path("map.db")).sessions().size(), 2U);
+}
+
+TEST_F(MapSession, FeaturesThatNoImageHasAreLeftOut) {
+  const Features whole = extract_surf(view(1));
+  std::vector<Features> strange(3, whole);
+  strange[0].keypoints[0].x_px = 3e38F;
+  strange[1].keypoints[0].scale = std::numeric_limits<float>::quiet_NaN();
+  strange[2].working_size_px = {};
+  MapWriter writer(path("map.db"), fast_options(), "drive");
+  writer.for_each_earlier_place([](const SessionFrame&, const BinaryContent&) {});
+  writer.add({.frame = 0}, {}, std::make_shared<Features>(whole), {});
+  for (int i = 0; i < 3; ++i) {
+    writer.add({.frame = i + 1}, {},
+               std::make_shared<Features>(strange[static_cast<std::size_t>(i)]), {});
+  }
+  writer.finish();
+  MapReader map(path("map.db"));
+  map.for_each_earlier_place([](const SessionFrame&, const BinaryContent&) {});
+  EXPECT_EQ(map.features(0)->keypoints.size(), whole.keypoints.size());
+  for (const PlaceId place : {1, 2, 3})
+    EXPECT_TRUE(map.features(place)->keypoints.empty()) << place;
+  EXPECT_EQ(map.damage().size(), 3U);
 }
 
 TEST_F(MapSession, AFrameThatCouldNotBeReadIsNoDamage) {

@@ -4,6 +4,8 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
+#include <tuple>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -99,6 +101,17 @@ TEST(OdometryTest, FramesWithoutOdometryAreBridged) {
   EXPECT_NEAR(track.between(0, 2)->T_from_to(2, 3), 2, 1e-12);
   EXPECT_EQ(track.path_m(1), 0);
   EXPECT_EQ(track.path_m(2), 2);
+  track.add(std::nullopt);
+  track.add(std::nullopt);
+  EXPECT_EQ(track.size(), 5);
+  EXPECT_FALSE(track.between(2, 4));
+  EXPECT_EQ(track.path_m(4), 2) << "as at the last frame with odometry";
+  track.add(OdometryPose{level_pose(0, 5, 0)});
+  EXPECT_FALSE(track.is_known(4));
+  EXPECT_EQ(track.path_m(4), 2);
+  EXPECT_NEAR(track.between(2, 5)->T_from_to(2, 3), 3, 1e-12);
+  EXPECT_THROW(std::ignore = track.path_m(6), std::out_of_range);
+  EXPECT_THROW(std::ignore = track.is_known(-1), std::out_of_range);
 }
 
 TEST(OdometryTest, BadPosesAreErrorsAndChangeNothing) {

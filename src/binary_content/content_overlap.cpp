@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 // What needs no image, and so nothing that is compiled of OpenCV.
 #include <algorithm>
+#include <bit>
 #include <cassert>
 #include <cstdlib>
 

@@ -1,6 +1,5 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <map>
 #include <memory>
 #include <string>
@@ -16,7 +15,6 @@
 
 #include "commands.hpp"
 #include "map_output.hpp"
-#include "process.hpp"
 #include "summary.hpp"
 
 namespace loopbit::cli {

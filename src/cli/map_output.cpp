@@ -3,7 +3,6 @@
 #include "map_output.hpp"
 
 #include <filesystem>
-#include <string_view>
 #include <system_error>
 
 #include <fmt/format.h>

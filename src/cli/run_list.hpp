@@ -2,9 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <string>
-#include <vector>
 
 #include "loopbit/report.hpp"
 

@@ -3,7 +3,6 @@
 #include "connection.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstdlib>
 #include <cstring>

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "fleet_database.hpp"
 
-#include <string_view>
-
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"

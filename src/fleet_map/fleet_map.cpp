@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/fleet_map.hpp"
 
-#include <algorithm>
 #include <memory>
 #include <string>
 

@@ -7,7 +7,6 @@
 #include <bit>
 #include <fstream>
 #include <limits>
-#include <span>
 #include <string_view>
 
 namespace loopbit::images {

@@ -32,7 +32,10 @@ constexpr int kMinSpots = 16;
 constexpr int kHalfGap_px = 3;
 constexpr int kBeside_px = 6;
 
-int rounded(float x) { return static_cast<int>(std::lround(x)); }
+/// As std::lround(), which is a call, for x >= 0: a double has bits enough for the sum.
+int rounded(float x) {
+  return static_cast<int>(static_cast<double>(x) + 0.5);  // NOLINT(bugprone-incorrect-roundings)
+}
 
 /// The pixel of a content that shows a keypoint.
 cv::Point content_pixel(const Keypoint& keypoint, const cv::Size& size_px) {

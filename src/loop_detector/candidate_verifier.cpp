@@ -49,9 +49,9 @@ struct CandidateVerifier::Frame {
   std::vector<Spot> promising;  ///< where promising candidates stand
   std::vector<int> features;    ///< of the query: inliers of one of them, in order
 
-  void note_promising(const Spot& spot, const Verification& result) {
+  void note_promising(const Spot& spot, const std::vector<Match>& inliers) {
     promising.push_back(spot);
-    for (const Match& inlier : result.inliers) features.push_back(inlier.query);
+    for (const Match& inlier : inliers) features.push_back(inlier.query);
     std::sort(features.begin(), features.end());
     features.erase(std::unique(features.begin(), features.end()), features.end());
   }
@@ -83,7 +83,6 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
         {c, places_.step_of(c.place), !query.may_match || query.may_match(c.place)});
   }
   looks_.resize(std::max(looks_.size(), candidates.size()));
-  verifications_.resize(std::max(verifications_.size(), candidates.size()));
   look(frame);
   const auto closer = static_cast<std::size_t>(options_.verification.max_closer_looks);
   look_closer(frame, 0, num_similar, closer);
@@ -98,7 +97,7 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
 void CandidateVerifier::complete(const Query& query, std::vector<VerifiedCandidate>& verified) {
   for (VerifiedCandidate& v : verified) {
     if (v.geometry) continue;
-    v.geometry = geometry_of(query, v.candidate.place, FirstLook{}, verification_, true);
+    v.geometry = geometry_of(query, v.candidate.place, FirstLook{}, true);
   }
 }
 
@@ -151,18 +150,17 @@ void CandidateVerifier::look_at_others(Frame& frame) {
 
 void CandidateVerifier::verify_in_full(Frame& frame, std::size_t i, bool even_if_chance) {
   VerifiedCandidate& v = frame.verified[i];
-  v.geometry =
-      geometry_of(frame.query, v.candidate.place, looks_[i], verifications_[i], even_if_chance);
+  v.geometry = geometry_of(frame.query, v.candidate.place, looks_[i], even_if_chance);
   if (v.geometry && v.geometry->excess() > 0) {
-    frame.note_promising(spot_of(v), verifications_[i]);
+    frame.note_promising(spot_of(v), v.geometry->inliers);
   }
 }
 
 /// None where all matches together would be no more than chance, unless `even_if_chance`.
 std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& query, PlaceId place,
                                                                 const FirstLook& look,
-                                                                Verification& result,
                                                                 bool even_if_chance) {
+  Verification& result = verification_;
   const Features& features = places_.features(place, held_);
   verifier_.match(query.features, features, look, result);
   CandidateGeometry geometry{
@@ -172,7 +170,7 @@ std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& que
   const double most = geometry.matches * inlier_worth(1.0, query.view_inliers);
   if (most <= geometry.chance_inliers && !even_if_chance) return std::nullopt;
   verifier_.find_geometry(query.features, features, result, query.camera);
-  geometry.inliers = static_cast<int>(result.inliers.size());
+  geometry.inliers = result.inliers;
   geometry.distinct_inliers = result.distinct_inliers;
   geometry.inlier_worth = inlier_worth(result.explained_share, query.view_inliers);
   return geometry;
@@ -191,18 +189,16 @@ bool CandidateVerifier::is_elsewhere(const Frame& frame, const VerifiedCandidate
 
 void CandidateVerifier::find_distinctness(Frame& frame) const {
   std::vector<Sighting> sightings;
-  for (std::size_t i = 0; i < frame.verified.size(); ++i) {
-    const VerifiedCandidate& v = frame.verified[i];
+  for (const VerifiedCandidate& v : frame.verified) {
     if (!v.geometry || v.geometry->distinct_inliers < kMinSightingInliers) continue;
-    sightings.push_back({spot_of(v), verifications_[i].inliers});
+    sightings.push_back({spot_of(v), v.geometry->inliers});
   }
   std::sort(sightings.begin(), sightings.end(), [](const Sighting& a, const Sighting& b) {
     return std::pair(a.spot.first_visit, a.spot.step) < std::pair(b.spot.first_visit, b.spot.step);
   });
-  for (std::size_t i = 0; i < frame.verified.size(); ++i) {
-    VerifiedCandidate& v = frame.verified[i];
-    if (!v.geometry || v.geometry->inliers == 0) continue;
-    v.geometry->distinctness = distinctness({spot_of(v), verifications_[i].inliers}, sightings);
+  for (VerifiedCandidate& v : frame.verified) {
+    if (!v.geometry || v.geometry->inliers.empty()) continue;
+    v.geometry->distinctness = distinctness({spot_of(v), v.geometry->inliers}, sightings);
   }
 }
 

@@ -4,7 +4,6 @@
 
 #include <cstddef>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "loopbit/loop_detector_options.hpp"
@@ -19,7 +18,7 @@ namespace loopbit {
 /// What matching and epipolar geometry found for one candidate.
 struct CandidateGeometry {
   int matches = 0;
-  int inliers = 0;
+  std::vector<Match> inliers = {};
   int distinct_inliers = 0;
   double inlier_worth = 1;  ///< 0 to 1, see inlier_worth()
   double distinctness = 1;  ///< 0 to 1, see distinctness()
@@ -83,8 +82,7 @@ class CandidateVerifier {
   void look_at_others(Frame& frame);
   void verify_in_full(Frame& frame, std::size_t i, bool even_if_chance);
   std::optional<CandidateGeometry> geometry_of(const Query& query, PlaceId place,
-                                               const FirstLook& look, Verification& result,
-                                               bool even_if_chance);
+                                               const FirstLook& look, bool even_if_chance);
   [[nodiscard]] Spot spot_of(const VerifiedCandidate& candidate) const;
   [[nodiscard]] bool is_elsewhere(const Frame& frame, const VerifiedCandidate& candidate) const;
   void find_distinctness(Frame& frame) const;
@@ -96,7 +94,6 @@ class CandidateVerifier {
   Verifier thorough_verifier_;  ///< its first look matches all keypoints
   DisplacementVotes votes_;
   std::vector<FirstLook> looks_;
-  std::vector<Verification> verifications_;
   Verification verification_;
 };
 

@@ -62,19 +62,21 @@ Displacements::Square Displacements::fullest() const {
 void DisplacementVotes::append_nearest(const FirstLook::Group& group, std::size_t first_query,
                                        std::size_t first_place) {
   if (group.num_query == 0) return;
-  nearest_.assign(group.num_place, {std::numeric_limits<std::int32_t>::max(), -1});
+  nearest_.assign(group.num_place, std::numeric_limits<std::uint64_t>::max());
   for (std::size_t i = 0; i < group.nearest.size(); ++i) {
     const FirstLook::Neighbours& found = group.nearest[i];
-    Nearest& known = nearest_[static_cast<std::size_t>(found.index)];
-    if (found.distance_sq < known.distance_sq) {
-      known = {found.distance_sq, static_cast<std::int32_t>(i)};
-    }
+    std::uint64_t& known = nearest_[static_cast<std::size_t>(found.index)];
+    known = std::min(known, static_cast<std::uint64_t>(found.distance_sq) << 32U | i);
   }
+  // Which features are kept is hard to foresee: writing each takes no branch.
+  std::size_t kept = matches_.size();
+  matches_.resize(kept + group.nearest.size());
   for (std::size_t i = 0; i < group.nearest.size(); ++i) {
     const auto at = static_cast<std::size_t>(group.nearest[i].index);
-    if (nearest_[at].query != static_cast<std::int32_t>(i)) continue;
-    matches_.push_back({static_cast<int>(first_query + i), static_cast<int>(first_place + at)});
+    matches_[kept] = {static_cast<int>(first_query + i), static_cast<int>(first_place + at)};
+    kept += static_cast<std::uint32_t>(nearest_[at]) == i ? 1U : 0U;
   }
+  matches_.resize(kept);
 }
 
 const std::vector<Match>& DisplacementVotes::nearest_matches(const Features& query,

@@ -34,9 +34,8 @@ class Displacements {
     return offset == 0 || offset == 1 || offset == kStride || offset == kStride + 1;
   }
   static constexpr bool share_a_square(int a, int b) {
-    const int offset = a - b + kStride + 1;
-    const int row = offset / kStride;
-    return offset >= 0 && row <= 2 && offset - row * kStride <= 2;
+    const int apart = a < b ? b - a : a - b;
+    return apart <= 1 || (apart >= kStride - 1 && apart <= kStride + 1);
   }
 
   Displacements() = default;
@@ -106,11 +105,6 @@ class DisplacementVotes {
                                             const FirstLook& look);
 
  private:
-  struct Nearest {
-    std::int32_t distance_sq = 0;
-    std::int32_t query = 0;
-  };
-
   /// A feature of the query, and the bin of its displacement.
   struct Moved {
     int feature = 0;
@@ -125,7 +119,8 @@ class DisplacementVotes {
 
   double min_spacing_scales_ = 0;
   Neighbourhoods neighbourhoods_;  ///< of the query
-  std::vector<Nearest> nearest_;   ///< of the features of a place
+  /// Of the features of a place: the squared distance, then the query's feature in the lower half.
+  std::vector<std::uint64_t> nearest_;
   std::vector<Match> matches_;
   std::vector<std::int16_t> looked_at_;  ///< features of the query
   std::vector<Moved> moved_;

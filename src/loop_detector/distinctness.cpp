@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "distinctness.hpp"
 
-#include <algorithm>
 #include <cstdlib>
 #include <limits>
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <tuple>
 #include <utility>
@@ -59,7 +60,25 @@ LoopDetectorOptions validated(const LoopDetectorOptions& options) {
 
 Status reason_of_rejection(const CandidateGeometry& best, const VerificationOptions& options) {
   if (best.matches < options.min_matches) return Status::few_matches;
-  return best.inliers == 0 ? Status::no_geometry : Status::low_score;
+  return best.inliers.empty() ? Status::no_geometry : Status::low_score;
+}
+
+/// Throws Error (kind input) unless they are whole, as SurfExtractor makes them.
+void check_whole(const Features& features) {
+  const std::size_t size = features.keypoints.size();
+  const cv::Size& size_px = features.working_size_px;
+  constexpr std::size_t kMost = std::numeric_limits<std::int16_t>::max();
+  const bool has_image = size == 0 || !size_px.empty();
+  if (features.descriptors.size() == size && features.num_dark <= size && size <= kMost &&
+      has_image) {
+    return;
+  }
+  throw Error(
+      ErrorKind::input,
+      fmt::format("Features with {} keypoints, {} descriptors and {} dark blobs in {} x {} px "
+                  "are not whole; give those that loopbit extracted.",
+                  size, features.descriptors.size(), features.num_dark, size_px.width,
+                  size_px.height));
 }
 
 /// Inliers that moved between two images. Those that did not may be the robot itself, dirt on the
@@ -151,6 +170,7 @@ class LoopDetector::Impl {
 
   /// The same for an observation whose content and features are known.
   Detection detect(const Given& given, Observation& seen) const {
+    check_whole(seen.features);
     Detection detection = unanswered(given);
     recognise(seen, {}, detection);
     return detection;
@@ -191,9 +211,9 @@ class LoopDetector::Impl {
     Evidence evidence{seen.content, seen.saliency, {}};
     if (detection.inliers == 0) return evidence;
     const Features& place = features(seen.best->candidate.place, seen);
-    const Verification result = verify(seen.features, place, options_.verification, camera());
-    evidence.inliers.reserve(result.inliers.size());
-    for (const Match& match : result.inliers) {
+    const std::vector<Match>& inliers = seen.best->geometry->inliers;
+    evidence.inliers.reserve(inliers.size());
+    for (const Match& match : inliers) {
       evidence.inliers.push_back(
           {relative_position(seen.features, match.query), relative_position(place, match.place)});
     }
@@ -220,7 +240,7 @@ class LoopDetector::Impl {
                         .score = score(v, seen),
                         .similarity = v.candidate.similarity,
                         .matches = v.geometry->matches,
-                        .inliers = v.geometry->inliers});
+                        .inliers = static_cast<int>(v.geometry->inliers.size())});
     }
     if (seen.best) places.front().score = detection.score;
     return places;
@@ -392,7 +412,7 @@ class LoopDetector::Impl {
   void add_place(const BinaryContent& content, Features features,
                  const std::optional<RecentView::Look>& look, const Detection& detection,
                  const cv::Mat& image) {
-    odometry_.reserve_next();
+    odometry_.reserve_next(detection.odometry.has_value());
     // The time of a frame that nothing matches may be wrong, and would shut out those after it.
     const double last_s =
         times_s_.empty() ? -std::numeric_limits<double>::infinity() : times_s_.back();
@@ -689,7 +709,7 @@ class LoopDetector::Impl {
     set_match(seen.best->candidate.place, detection);
     detection.similarity = seen.best->candidate.similarity;
     detection.matches = seen.best->geometry->matches;
-    detection.inliers = seen.best->geometry->inliers;
+    detection.inliers = static_cast<int>(seen.best->geometry->inliers.size());
   }
 
   LoopDetectorOptions options_;
@@ -735,6 +755,7 @@ Detection LoopDetector::process(const cv::Mat& image, std::optional<double> time
 Detection LoopDetector::process(const BinaryContent& content, Features features,
                                 std::optional<double> timestamp_s,
                                 const std::optional<OdometryPose>& odometry) {
+  impl_->learn();
   Impl::Observation seen = impl_->observation();
   seen.content = content;
   seen.features = std::move(features);

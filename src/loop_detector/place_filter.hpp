@@ -6,7 +6,6 @@
 #include <functional>
 #include <optional>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "loopbit/detection.hpp"

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <vector>
 
 #include "loopbit/detection.hpp"
 #include "loopbit/map_storage.hpp"

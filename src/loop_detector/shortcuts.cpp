@@ -6,8 +6,6 @@
 #include <cstddef>
 #include <iterator>
 
-#include "loopbit/rigid_motion.hpp"
-
 namespace loopbit {
 
 Shortcuts::Next Shortcuts::prepare(const Loop& loop, bool agrees) const {

@@ -29,6 +29,12 @@ double shifted_normal(double x, double mean) {
   return std::exp(-x / mean + 0.5 / (mean * mean)) * tail / mean;
 }
 
+/// std::lgamma() writes a global variable, and several threads may query.
+double log_gamma(double x) {
+  int sign = 0;
+  return ::lgamma_r(x, &sign);
+}
+
 }  // namespace
 
 double stabilized(int votes) { return std::sqrt(votes + 3.0 / 8.0); }
@@ -51,7 +57,7 @@ double clamped_sigmas(double sigmas) { return std::clamp(sigmas, kMinSigmas, kMa
 
 VotesRatio::VotesRatio(std::size_t num_null)
     : degrees_(static_cast<double>(std::min(kMaxDegrees, num_null - 1))),
-      factor_(std::exp(std::lgamma((degrees_ + 1) / 2) - std::lgamma(degrees_ / 2)) /
+      factor_(std::exp(log_gamma((degrees_ + 1) / 2) - log_gamma(degrees_ / 2)) /
               std::sqrt(degrees_ * std::numbers::pi)) {}
 
 double VotesRatio::of(double sigmas) const {

@@ -6,7 +6,6 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <optional>
-#include <vector>
 
 #include <opencv2/core.hpp>
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <numeric>
-#include <utility>
 
 #include "path_covariance.hpp"
 #include "pose_problem.hpp"

@@ -8,7 +8,6 @@
 #include <numeric>
 #include <set>
 #include <tuple>
-#include <utility>
 
 namespace loopbit::graph {
 namespace {

@@ -6,9 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <numeric>
 #include <string>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -17,7 +15,6 @@
 
 #include "graph_impl.hpp"
 #include "pose_problem.hpp"
-#include "robust_solve.hpp"
 
 namespace loopbit {
 namespace graph {

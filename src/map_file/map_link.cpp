@@ -8,13 +8,11 @@
 #include <optional>
 #include <set>
 #include <string>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
-#include "loopbit/error.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_tools.hpp"
 #include "loopbit/version.hpp"

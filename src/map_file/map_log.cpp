@@ -8,11 +8,9 @@
 #include <cstdint>
 #include <fstream>
 #include <istream>
-#include <optional>
 #include <random>
 #include <span>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include <fcntl.h>

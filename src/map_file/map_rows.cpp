@@ -36,13 +36,15 @@ constexpr std::int32_t kMaxKeypoints = 10000;
 bool is_sane(const Header& header) {
   const auto [width, height, num_dark, size] = header;
   const auto is_side = [](std::int32_t side) { return side >= 0 && side <= kMaxWorkingSide_px; };
-  return is_side(width) && is_side(height) && size >= 0 && size <= kMaxKeypoints && num_dark >= 0 &&
-         num_dark <= size;
+  const bool has_image = size == 0 || (width > 0 && height > 0);
+  return is_side(width) && is_side(height) && has_image && size >= 0 && size <= kMaxKeypoints &&
+         num_dark >= 0 && num_dark <= size;
 }
 
 bool is_sane(const Keypoint& keypoint) {
-  return std::isfinite(keypoint.x_px) && std::isfinite(keypoint.y_px) &&
-         std::isfinite(keypoint.scale) && std::isfinite(keypoint.angle_rad);
+  const auto is_in_reach = [](float px) { return std::abs(px) <= kMaxWorkingSide_px; };  // no NaN
+  return is_in_reach(keypoint.x_px) && is_in_reach(keypoint.y_px) && is_in_reach(keypoint.scale) &&
+         std::isfinite(keypoint.angle_rad);
 }
 
 template <typename T>

@@ -8,7 +8,6 @@
 #include <limits>
 #include <numbers>
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include <fmt/format.h>

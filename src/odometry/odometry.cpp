@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <stdexcept>
 
 #include <fmt/format.h>
 #include <opencv2/core/hal/hal.hpp>
@@ -96,47 +97,55 @@ OdometryTrack::OdometryTrack(const OdometryDrift& drift) : drift_(drift) {
 }
 
 OdometryTrack::Frame OdometryTrack::next(const std::optional<OdometryPose>& pose) const {
-  Frame frame;
-  if (last_) frame.path_m = last_->path_m;
+  Frame frame = end_;
   if (!pose) return frame;
-  check_odometry(*pose, fmt::format("The odometry of frame {}", frames_.size()));
+  check_odometry(*pose, fmt::format("The odometry of frame {}", size_));
   frame.is_known = true;
   frame.pose = pose->T_odometry_camera;
-  if (!last_) return frame;
-  const Motion step = odometry_step(last_->pose, *pose, drift_);
+  if (frames_.empty()) return frame;
+  const Frame& last = frames_.back();
+  const Motion step = odometry_step(last.pose, *pose, drift_);
   const cv::Matx66d adjoint = rigid::adjoint(frame.pose);
   frame.path_m += cv::norm(rigid::translation(step.T_from_to));
-  frame.drift = last_->drift + adjoint * step.covariance * adjoint.t();
+  frame.drift = last.drift + adjoint * step.covariance * adjoint.t();
   return frame;
 }
 
 void OdometryTrack::add(const std::optional<OdometryPose>& pose) {
-  const Frame frame = next(pose);
-  frames_.push_back(frame);
-  if (pose) last_ = frame;
+  if (pose) {
+    const Frame frame = next(pose);
+    frames_.resize(static_cast<std::size_t>(size_), end_);
+    frames_.push_back(frame);
+    end_.path_m = frame.path_m;
+  }
+  ++size_;
 }
 
-void OdometryTrack::reserve_next() {
-  if (frames_.size() == frames_.capacity()) frames_.reserve(2 * frames_.size() + 1);
+void OdometryTrack::reserve_next(bool is_known) {
+  const auto needed = static_cast<std::size_t>(size_) + 1;
+  if (is_known && frames_.capacity() < needed) frames_.reserve(2 * needed);
+}
+
+const OdometryTrack::Frame& OdometryTrack::at(int frame) const {
+  if (frame < 0 || frame >= size_) throw std::out_of_range("OdometryTrack");
+  const auto index = static_cast<std::size_t>(frame);
+  return index < frames_.size() ? frames_[index] : end_;
 }
 
 std::optional<Motion> OdometryTrack::between(int from, int to) const {
-  const Frame& b = frames_.at(static_cast<std::size_t>(to));
-  auto motion = to_next(from, b);
+  auto motion = to_next(from, at(to));
   if (motion && to < from) motion->covariance *= -1;  // of the drift since `to`
   return motion;
 }
 
 std::optional<Motion> OdometryTrack::to_next(int from, const Frame& next) const {
-  const Frame& a = frames_.at(static_cast<std::size_t>(from));
+  const Frame& a = at(from);
   if (!a.is_known || !next.is_known) return std::nullopt;
   const cv::Matx44d back = rigid::inverse(next.pose);
   const cv::Matx66d adjoint = rigid::adjoint(back);
   return Motion{rigid::inverse(a.pose) * next.pose, adjoint * (next.drift - a.drift) * adjoint.t()};
 }
 
-double OdometryTrack::path_m(int frame) const {
-  return frames_.at(static_cast<std::size_t>(frame)).path_m;
-}
+double OdometryTrack::path_m(int frame) const { return at(frame).path_m; }
 
 }  // namespace loopbit

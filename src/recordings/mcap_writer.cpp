@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/mcap_writer.hpp"
 
-#include <algorithm>
 #include <cerrno>
 #include <concepts>
 #include <cstdio>

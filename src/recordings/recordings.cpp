@@ -3,7 +3,6 @@
 #include "loopbit/recordings.hpp"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <map>
 #include <string_view>

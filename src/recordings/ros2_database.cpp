@@ -9,10 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <fmt/format.h>
-
 #include "loopbit/database.hpp"
-#include "loopbit/error.hpp"
 
 #include "recording_file.hpp"
 

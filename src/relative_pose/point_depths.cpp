@@ -7,8 +7,6 @@
 #include <map>
 #include <optional>
 
-#include <fmt/format.h>
-
 #include "loopbit/error.hpp"
 
 #include "pose_fit.hpp"

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "ray_pairs.hpp"
 
-#include <cmath>
-
 namespace loopbit {
 
 double keypoint_sigma_px(const Keypoint& keypoint) {

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <optional>
-
 #include <nlohmann/json.hpp>
 
 #include "loopbit/finished_run.hpp"

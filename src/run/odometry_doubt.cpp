@@ -1,8 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <cstddef>
-#include <utility>
 #include <vector>
 
 #include <fmt/format.h>

@@ -60,31 +60,30 @@ void HessianPyramid::build(const IntegralImage& integral, const SurfKernels& ker
     const int first_new = o == 0 ? 0 : 2;
     for (int i = 0; i < first_new; ++i) take_from_below(o, i);
     for (int begin = 0; begin < octave.samples.width; begin += tile) {
-      compute({begin, 0, tile, octave.samples.height}, o, first_new, kernels);
+      compute(begin, std::min(tile, octave.samples.width - begin), o, first_new, kernels);
     }
   }
 }
 
-void HessianPyramid::compute(const cv::Rect& tile, int octave, int first_interval,
+void HessianPyramid::compute(int begin, std::ptrdiff_t count, int octave, int first_interval,
                              const SurfKernels& kernels) {
   const std::ptrdiff_t step = step_px(octave);
   const std::ptrdiff_t part = step / kRowStep_px;
   Octave& of = octaves_[static_cast<std::size_t>(octave)];
   const IntegralView integral = integral_->view();
-  const std::ptrdiff_t count = std::min(tile.width, of.samples.width - tile.x);
-  for (int y = 0; y < tile.height; ++y) {
+  for (int y = 0; y < of.samples.height; ++y) {
     const std::ptrdiff_t y_px = y * step;
     for (int i = first_interval; i < kIntervals; ++i) {
       const std::ptrdiff_t lobe = lobe_px(octave, i);
       const std::ptrdiff_t reach = (3 * lobe - 1) / 2;
       if (y_px < reach || y_px + reach >= integral_->size_px().height) continue;
-      float* out = of.row(i, y) + tile.x;
+      float* out = of.row(i, y) + begin;
       if (part == 1) {
-        kernels.hessian_row(integral, y_px, tile.x, count, lobe, out);
+        kernels.hessian_row(integral, y_px, begin, count, lobe, out);
         continue;
       }
       std::array<float, kHessianRun> responses{};
-      kernels.hessian_row(integral, y_px, tile.x * part, (count - 1) * part + 1, lobe,
+      kernels.hessian_row(integral, y_px, begin * part, (count - 1) * part + 1, lobe,
                           responses.data());
       for (std::ptrdiff_t x = 0; x < count; ++x) {
         out[x] = responses[static_cast<std::size_t>(x * part)];

@@ -77,7 +77,8 @@ class HessianPyramid {
     }
   };
 
-  void compute(const cv::Rect& tile, int octave, int first_interval, const SurfKernels& kernels);
+  void compute(int begin, std::ptrdiff_t count, int octave, int first_interval,
+               const SurfKernels& kernels);
   void take_from_below(int octave, int interval);
   void append_marked(int octave, int interval, int y, std::vector<Maximum>& maxima) const;
   [[nodiscard]] bool equals_earlier_neighbour(int octave, int interval, int x, int y) const;

@@ -6,7 +6,6 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <span>
 #include <string_view>
 
 #include <fmt/format.h>

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/truth_file.hpp"
 
-#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <string_view>

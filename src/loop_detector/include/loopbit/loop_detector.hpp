@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cstddef>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -63,7 +62,7 @@ class LoopDetector {
   ///
   /// `image`: 8- or 16-bit, grey, BGR or BGRA, at least 32 x 32. `timestamp_s`: in seconds, not
   /// before the previous one; only needed if the exclusion window is given in seconds. `evidence`:
-  /// if not null, receives the evidence for the answer, at the cost of one more verification.
+  /// if not null, receives the evidence for the answer.
   /// `allowed`: restricts the candidates of this frame. Throws Error (kind input) if the image or
   /// the time cannot be used, std::bad_alloc if there is no memory for another place, and whatever
   /// MapStorage::add throws. In each case the detector is unchanged.
@@ -77,7 +76,8 @@ class LoopDetector {
                     const AllowedPlaces& allowed = {});
 
   /// The same for an image whose content and features a MapStorage received in an earlier run. They
-  /// give the answer that the image itself would give.
+  /// give the answer that the image itself would give; set_mask() does not apply. Throws Error
+  /// (kind input) for features that are not whole, too.
   Detection process(const BinaryContent& content, Features features,
                     std::optional<double> timestamp_s = std::nullopt,
                     const std::optional<OdometryPose>& odometry = std::nullopt);

@@ -74,7 +74,7 @@ bool is_valid(const OdometryPose& pose);
 void check_odometry(const OdometryPose& pose, const std::string& name);
 
 /// Odometry along a session, with the drift between any two of its frames. Memory: 450 bytes per
-/// frame.
+/// frame up to the last one with odometry.
 class OdometryTrack {
  public:
   /// Throws Error (kind option) if `drift` is not valid.
@@ -95,8 +95,9 @@ class OdometryTrack {
   /// check_odometry(); the track is then unchanged.
   void add(const std::optional<OdometryPose>& pose);
 
-  /// Takes the memory that the next add() needs, so that it only throws for a bad pose.
-  void reserve_next();
+  /// Takes the memory that the next add() needs, so that it only throws for a bad pose. `is_known`:
+  /// the next frame has odometry.
+  void reserve_next(bool is_known);
 
   /// The motion between two frames. None if odometry is not known at one of them. The covariance
   /// adds up the drift of all steps between them. Constant time.
@@ -106,21 +107,22 @@ class OdometryTrack {
   [[nodiscard]] std::optional<Motion> to_next(int from, const Frame& next) const;
 
   /// Whether odometry is known at `frame`.
-  [[nodiscard]] bool is_known(int frame) const {
-    return frames_.at(static_cast<std::size_t>(frame)).is_known;
-  }
+  [[nodiscard]] bool is_known(int frame) const { return at(frame).is_known; }
 
   /// Distance driven until `frame`, in metres. At a frame without odometry, that of the last frame
   /// with it.
   [[nodiscard]] double path_m(int frame) const;
 
   /// Number of frames.
-  [[nodiscard]] int size() const { return static_cast<int>(frames_.size()); }
+  [[nodiscard]] int size() const { return size_; }
 
  private:
+  [[nodiscard]] const Frame& at(int frame) const;
+
   OdometryDrift drift_;
-  std::vector<Frame> frames_;
-  std::optional<Frame> last_;  ///< with odometry
+  int size_ = 0;
+  std::vector<Frame> frames_;  ///< up to the last one with odometry
+  Frame end_;                  ///< as all frames after it
 };
 
 }  // namespace loopbit
