@@ -37,13 +37,13 @@ Features scattered(int count, std::uint32_t seed) {
 
 std::vector<Match> nearest(const Features& query, const Features& place) {
   FirstLook look;
-  Verifier().match_strongest(query, place, look);
+  Verifier().match_strongest(query, place, 300, look);
   return DisplacementVotes(10.0).nearest_matches(query, place, look);
 }
 
 Votes counted(const Features& query, const Features& place) {
   FirstLook look;
-  Verifier().match_strongest(query, place, look);
+  Verifier().match_strongest(query, place, 300, look);
   DisplacementVotes votes(10.0);
   votes.begin(query, std::span(&look, 1));
   return votes.count(query, place, look);

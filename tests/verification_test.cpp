@@ -548,14 +548,14 @@ Features strongest(const Features& all, std::size_t num) {
 }
 
 TEST(Verify, AFirstLookMatchesTheStrongestFeatures) {
-  constexpr int kLooked = 60;
+  constexpr std::size_t kLooked = 60;
   const Features query = extract_surf(view(2));
   const Features place = extract_surf(view(2, {12, 5}));
   const Features of_query = strongest(query, kLooked);
   const Features of_place = strongest(place, kLooked);
-  Verifier verifier({.first_look_keypoints = kLooked});
+  Verifier verifier;
   FirstLook look;
-  verifier.match_strongest(query, place, look);
+  verifier.match_strongest(query, place, kLooked, look);
   const std::vector<Match> expected = match_features(of_query, of_place, 0.8);
   ASSERT_GT(expected.size(), 5U);
   ASSERT_EQ(look.matches.size(), expected.size());
@@ -597,9 +597,9 @@ TEST(Verify, AFirstLookAtFewFeaturesIsAWholeOne) {
   const Features place = extract_surf(view(2, {12, 5}), {.max_keypoints = 90});
   Verifier verifier;
   FirstLook look;
-  verifier.match_strongest(query, place, look);
+  verifier.match_strongest(query, place, 300, look);
   EXPECT_EQ(look.matches, verify(query, place).matches);
-  verifier.match_strongest(query, {}, look);
+  verifier.match_strongest(query, {}, 300, look);
   EXPECT_TRUE(look.matches.empty());
 }
 
@@ -622,11 +622,11 @@ TEST(Verify, AFirstLookChangesNoMatch) {
                                         {}};
   Verification result;
   FirstLook look;
-  for (const int looked : {16, 17, 60, 300, 10'000}) {
-    Verifier verifier({.first_look_keypoints = looked});
+  Verifier verifier;
+  for (const std::size_t looked : {16U, 17U, 60U, 300U, 10'000U}) {
     for (const Features& place : places) {
       for (const auto& [a, b] : {std::pair(&query, &place), std::pair(&place, &query)}) {
-        verifier.match_strongest(*a, *b, look);
+        verifier.match_strongest(*a, *b, looked, look);
         verifier.match(*a, *b, look, result);
         EXPECT_EQ(result.matches, match_features(*a, *b, 0.8)) << looked;
         verifier.match(*a, *b, result);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -27,11 +28,6 @@ constexpr std::size_t kMinSharedMatches = 4;
 constexpr std::size_t kMinFirstMatches = 3;
 /// Of the places where the robot is expected, so many are looked at closer.
 constexpr std::size_t kExpectedCloserLooks = 4;
-
-VerificationOptions thorough(VerificationOptions options) {
-  options.first_look_keypoints = 10000;
-  return options;
-}
 
 }  // namespace
 
@@ -70,7 +66,6 @@ CandidateVerifier::CandidateVerifier(const LoopDetectorOptions& options, const P
       places_(places),
       held_(held),
       verifier_(options.verification),
-      thorough_verifier_(thorough(options.verification)),
       votes_(options.verification.min_spacing_scales) {}
 
 std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
@@ -103,13 +98,15 @@ void CandidateVerifier::complete(const Query& query, std::vector<VerifiedCandida
 
 void CandidateVerifier::look(Frame& frame) {
   const Features& query = frame.query.features;
-  Verifier& verifier = frame.query.closely ? thorough_verifier_ : verifier_;
+  const auto strongest = frame.query.closely
+                             ? std::numeric_limits<std::size_t>::max()
+                             : static_cast<std::size_t>(options_.verification.first_look_keypoints);
   const auto place = [&](std::size_t i) -> const Features& {
     return places_.features(frame.verified[i].candidate.place, held_);
   };
   const std::span looks = std::span(looks_).first(frame.verified.size());
   for (std::size_t i = 0; i < looks.size(); ++i) {
-    verifier.match_strongest(query, place(i), looks[i]);
+    verifier_.match_strongest(query, place(i), strongest, looks[i]);
   }
   votes_.begin(query, looks);
   for (std::size_t i = 0; i < looks.size(); ++i) {

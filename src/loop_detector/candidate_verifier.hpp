@@ -91,7 +91,6 @@ class CandidateVerifier {
   const Places& places_;
   PlaceMemory::Held& held_;
   Verifier verifier_;
-  Verifier thorough_verifier_;  ///< its first look matches all keypoints
   DisplacementVotes votes_;
   std::vector<FirstLook> looks_;
   Verification verification_;

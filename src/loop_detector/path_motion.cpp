@@ -23,6 +23,14 @@ constexpr double kTurn = 0.01;
 
 constexpr std::ptrdiff_t kMostMoved = kMoves.size() - 1;
 
+/// The item of `step`, or the end. `items`: in the order of steps.
+template <typename Items>
+auto item_at(const Items& items, std::ptrdiff_t step) {
+  using Item = typename Items::value_type;
+  const auto found = std::ranges::lower_bound(items, step, {}, &Item::step);
+  return found != items.end() && found->step == step ? found : items.end();
+}
+
 /// Of each state one step later, its probability after all frames by its predicted one.
 class Ratios {
  public:
@@ -32,14 +40,14 @@ class Ratios {
     const double new_ratio = elsewhere > 0 ? later.elsewhere() / elsewhere : 0.0;
     for (const Hypothesis& h : prior.places) ratios_.push_back({h.step, 0, 0});
     for (const Hypothesis& h : later.places) {
-      const auto known = find(prior.places, h.step);
+      const auto known = item_at(prior.places, h.step);
       if (known == prior.places.end()) continue;
       Hypothesis& ratio = ratios_[static_cast<std::size_t>(known - prior.places.begin())];
       if (known->forward > 0) ratio.forward = h.forward / known->forward;
       if (known->backward > 0) ratio.backward = h.backward / known->backward;
     }
     for (const auto& [step, probability] : returns) {
-      const auto there = find(ratios_, step);
+      const auto there = item_at(ratios_, step);
       if (there == ratios_.end()) continue;
       away -= 2 * probability;
       away_ += probability * (there->forward + there->backward);
@@ -63,12 +71,6 @@ class Ratios {
   }
 
  private:
-  static std::vector<Hypothesis>::const_iterator find(const std::vector<Hypothesis>& places,
-                                                      std::ptrdiff_t step) {
-    const auto found = std::ranges::lower_bound(places, step, {}, &Hypothesis::step);
-    return found != places.end() && found->step == step ? found : places.end();
-  }
-
   std::vector<Hypothesis> ratios_;
   double away_ = 0;
 };
@@ -82,8 +84,8 @@ double Belief::elsewhere() const {
 }
 
 double Belief::at(std::ptrdiff_t step) const {
-  const auto found = std::ranges::lower_bound(places, step, {}, &Hypothesis::step);
-  return found != places.end() && found->step == step ? found->probability() : 0.0;
+  const auto found = item_at(places, step);
+  return found == places.end() ? 0.0 : found->probability();
 }
 
 std::optional<std::ptrdiff_t> Belief::peak() const {
@@ -102,8 +104,8 @@ double from_anywhere(std::ptrdiff_t num_steps) {
 }
 
 double probability_at(const Returns& returns, std::ptrdiff_t step) {
-  const auto found = std::ranges::lower_bound(returns, step, {}, &Return::step);
-  return found != returns.end() && found->step == step ? found->probability : 0.0;
+  const auto found = item_at(returns, step);
+  return found == returns.end() ? 0.0 : found->probability;
 }
 
 Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,

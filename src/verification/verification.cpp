@@ -166,9 +166,9 @@ class Verifier::Impl {
     clear_geometry(result);
   }
 
-  void match_strongest(const Features& query, const Features& place, FirstLook& look) {
-    matcher_.match_strongest(query, place, options_.max_ratio,
-                             static_cast<std::size_t>(options_.first_look_keypoints), look);
+  void match_strongest(const Features& query, const Features& place, std::size_t strongest,
+                       FirstLook& look) {
+    matcher_.match_strongest(query, place, options_.max_ratio, strongest, look);
   }
 
   void match(const Features& query, const Features& place, const FirstLook& look,
@@ -216,8 +216,9 @@ void Verifier::match(const Features& query, const Features& place, Verification&
   impl_->match(query, place, result);
 }
 
-void Verifier::match_strongest(const Features& query, const Features& place, FirstLook& look) {
-  impl_->match_strongest(query, place, look);
+void Verifier::match_strongest(const Features& query, const Features& place, std::size_t strongest,
+                               FirstLook& look) {
+  impl_->match_strongest(query, place, strongest, look);
 }
 
 void Verifier::match(const Features& query, const Features& place, const FirstLook& look,

@@ -133,9 +133,9 @@ class Verifier {
   /// Sets `result.matches` (see match_features) and clears the rest.
   void match(const Features& query, const Features& place, Verification& result);
 
-  /// Matches only the strongest `first_look_keypoints` features of each image, in a fraction of the
-  /// time.
-  void match_strongest(const Features& query, const Features& place, FirstLook& look);
+  /// Matches only so many of the strongest features of each image, in a fraction of the time.
+  void match_strongest(const Features& query, const Features& place, std::size_t strongest,
+                       FirstLook& look);
 
   /// As match(), but reuses the result of match_strongest() for the same pair.
   void match(const Features& query, const Features& place, const FirstLook& look,
