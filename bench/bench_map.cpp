@@ -119,11 +119,13 @@ class MemoryMap : public loopbit::MapStorage {
   void add(const Detection& detection, const BinaryContent& content,
            std::shared_ptr<const Features> features, const cv::Mat& /*image*/) override {
     origins_.push_back({session_, detection.frame});
-    if (detection.status == loopbit::Status::loop) {
-      const auto match = detection.earlier_match.value_or(
-          SessionFrame{session_, detection.match.value_or(detection.frame)});
-      loops_.emplace_back(origins_.back(), match);
-    }
+    const auto loop_of = [&](const auto& loop) {
+      const SessionFrame here{session_, loop.match.value_or(0)};
+      return std::pair(SessionFrame{session_, loop.frame}, loop.earlier_match.value_or(here));
+    };
+    if (detection.status == loopbit::Status::loop) loops_.push_back(loop_of(detection));
+    for (const auto& loop : detection.withdrawn_loops) std::erase(loops_, loop_of(loop));
+    for (const auto& loop : detection.late_loops) loops_.push_back(loop_of(loop));
     contents_.push_back(content);
     features_.push_back(std::move(features));
   }
