@@ -27,6 +27,7 @@ import zlib
 
 from loopbit_command import (FRAMES, LOOPBIT, QUICK, WORLD, CommandTest, complaints, decisions,
                              loopbit, repeats_when_sanitized, rows)
+from served_command import TIME_LIMIT_S
 
 HEADER = (
     "frame,timestamp,status,match,score,similarity,matches,inliers,"
@@ -326,7 +327,9 @@ class CommandLineTest(CommandTest):
         for name, (flags, environment) in variants.items():
             with self.subTest(name):
                 out = self.scratch / name
-                ran = loopbit("run", self.images, "--out", out, *flags, environment=environment)
+                # In a process of its own: libraries read such variables when they are loaded.
+                ran = loopbit("run", self.images, "--out", out, *flags, environment=environment,
+                              timeout=TIME_LIMIT_S)
                 self.assertEqual(ran.returncode, 0, ran.stderr)
                 self.assertEqual(decisions(out), decisions(self.reference))
 
