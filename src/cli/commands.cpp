@@ -12,6 +12,7 @@
 #include "loopbit/finished_run.hpp"
 #include "loopbit/image_file.hpp"
 #include "loopbit/loop_detector_options.hpp"
+#include "loopbit/map_server.hpp"
 
 namespace loopbit::cli {
 namespace {
