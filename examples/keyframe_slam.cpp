@@ -98,7 +98,7 @@ class LoopCloser {
     if (found.status == loopbit::Status::loop) {
       back_end_.add_edge(keyframe.id, id_of(*found.match), found.score);
     }
-    // Loops of keyframes just before, of which only this one made sure.
+    // Loops of the keyframes just before, found only now.
     for (const loopbit::LateLoop& loop : found.late_loops) {
       back_end_.add_edge(id_of(loop.frame), id_of(*loop.match), loop.score);
     }

@@ -40,8 +40,8 @@ class LoopClosureNode : public rclcpp::Node {
     if (found.status == loopbit::Status::loop && found.match) {
       publish("loop", found.frame, *found.match, found.score);
     }
-    // Loops of images just before, of which only this one made sure, and loops that are now more
-    // likely wrong than right.
+    // Loops of the images just before, found only now, and loops that are now more likely wrong
+    // than right.
     for (const loopbit::LateLoop& loop : found.late_loops) {
       publish("late", loop.frame, *loop.match, loop.score);
     }

@@ -42,8 +42,8 @@ void add_topics(CLI::App& app);
 void add_options(CLI::App& app);
 
 /// Throws Error (kind option) if the file that one of the options `outputs` names would replace
-/// what `command` reads: the value of another option, or in such a folder a file of a run or an
-/// image. A run's page may be replaced.
+/// what `command` reads: the value of another option or, if that is a folder, a run's file or an
+/// image in it. The page of a run may be replaced.
 void protect_inputs(const CLI::App& command, const std::vector<std::string>& outputs);
 
 /// Makes options of `app` and its commands refuse an empty value, as an unset shell variable gives.

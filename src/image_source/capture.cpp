@@ -82,7 +82,8 @@ class CaptureSource final : public ImageSource {
   [[nodiscard]] std::string description() const override { return facts_.description; }
 
   [[nodiscard]] std::string early_end() const override {
-    if (!ended_ || !facts_.early_end.empty()) return ended_ ? facts_.early_end : "";
+    if (!ended_) return {};
+    if (!facts_.early_end.empty()) return facts_.early_end;
     const std::size_t expected = facts_.size.value_or(0);
     if (static_cast<double>(passed_) >= kMinReadable * static_cast<double>(expected)) return {};
     return fmt::format("Video '{}' ends after {} of about {} frames: copy it again or convert it.",
