@@ -661,6 +661,7 @@ class CommandLineTest(CommandTest):
         few = ["run", image.parent, "--no-report", "--out", self.scratch / "new"]
         for arguments, lost in [
                 ([*few, "--map", map_file, "--mcap-out"], map_file),
+                ([*few, "--map", f"{self.scratch}/./map.db", "--mcap-out"], map_file),
                 ([*few, "--truth", truth, "--mcap-out"], truth),
                 ([*few, "--mcap-out"], image),
                 (["run", image.parent, "--out", run, "--overwrite", "--mcap-out"], run / "loops.csv"),
