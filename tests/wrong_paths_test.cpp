@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "wrong_paths.hpp"
+
+#include <cstddef>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace loopbit {
+namespace {
+
+constexpr int kFrames = 300;
+
+/// What is learned when `deviations_of(frame)` of wrong places follow each other.
+template <typename DeviationsOf>
+double independence_after(const DeviationsOf& deviations_of) {
+  WrongPaths paths;
+  for (int frame = 0; frame < kFrames; ++frame) paths.commit(paths.prepare(deviations_of(frame)));
+  return paths.independence();
+}
+
+/// A street that looks like another one for 40 steps, and then another such street.
+ByStep street(int frame) { return {{1000 * (frame / 40) + frame, 2.0}}; }
+
+TEST(WrongPaths, StepsOfChanceAreIndependent) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> chance;
+  EXPECT_GT(independence_after([&](int frame) { return ByStep{{frame, chance(random)}}; }), 0.7);
+}
+
+TEST(WrongPaths, StepsOfAStreetThatLooksLikeAnotherCountLittle) {
+  EXPECT_LT(independence_after(street), 0.1);
+}
+
+TEST(WrongPaths, AnInterruptedPathBeginsAgain) {
+  const auto every_third = [](int frame) { return ByStep{{3 * frame, 2.0}}; };
+  EXPECT_GT(independence_after(every_third), 0.8);
+}
+
+TEST(WrongPaths, PlacesSideBySideAreOnePath) {
+  // Other places show chance, so that the street's share of what is learned decides.
+  const auto learned = [](std::ptrdiff_t beside) {
+    std::mt19937 random(1);
+    std::normal_distribution<double> chance;
+    return independence_after([&](int frame) {
+      ByStep wrong;
+      const auto [step, deviation] = street(frame).front();
+      for (std::ptrdiff_t at = step - beside; at <= step + beside; ++at) {
+        wrong.emplace_back(at, deviation);
+      }
+      for (int i = 0; i < 20; ++i) wrong.emplace_back(100000 + 1000 * i + frame, chance(random));
+      return wrong;
+    });
+  };
+  EXPECT_NEAR(learned(2), learned(0), 1e-3);
+  EXPECT_LT(learned(7), learned(0) - 0.02) << "15 places are more than one path";
+}
+
+}  // namespace
+}  // namespace loopbit
