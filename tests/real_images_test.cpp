@@ -106,7 +106,7 @@ TEST(RealImages, ARobotInViewIsNoPlace) {
        score_with_robots("corridor_loop", "corridor_loop/images", corridor_truth())) {
     EXPECT_EQ(counts.wrong, 0);
     // The robot takes up to a quarter of the image, and of what can be recognised.
-    EXPECT_GE(counts.recall(), 0.86);
+    EXPECT_GE(counts.recall(), 0.84);
   }
 }
 
