@@ -38,23 +38,42 @@ TEST(WrongPaths, AnInterruptedPathBeginsAgain) {
   EXPECT_GT(independence_after(every_third), 0.8);
 }
 
+/// The same beside other places that show chance, so that the street's share of what is learned
+/// decides. `seen(frame)`: what is seen of the street.
+template <typename Seen>
+double independence_among_others(const Seen& seen) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> chance;
+  return independence_after([&](int frame) {
+    ByStep wrong = seen(frame);
+    for (int i = 0; i < 20; ++i) wrong.emplace_back(100000 + 1000 * i + frame, chance(random));
+    return wrong;
+  });
+}
+
 TEST(WrongPaths, PlacesSideBySideAreOnePath) {
-  // Other places show chance, so that the street's share of what is learned decides.
   const auto learned = [](std::ptrdiff_t beside) {
-    std::mt19937 random(1);
-    std::normal_distribution<double> chance;
-    return independence_after([&](int frame) {
+    return independence_among_others([&](int frame) {
       ByStep wrong;
       const auto [step, deviation] = street(frame).front();
       for (std::ptrdiff_t at = step - beside; at <= step + beside; ++at) {
         wrong.emplace_back(at, deviation);
       }
-      for (int i = 0; i < 20; ++i) wrong.emplace_back(100000 + 1000 * i + frame, chance(random));
       return wrong;
     });
   };
   EXPECT_NEAR(learned(2), learned(0), 1e-3);
   EXPECT_LT(learned(7), learned(0) - 0.02) << "15 places are more than one path";
+}
+
+TEST(WrongPaths, OfPlacesSideBySideTheLongestPathCounts) {
+  // What is 3 steps ahead in every second frame only is no path.
+  const auto with_another = [](int frame) {
+    ByStep wrong = street(frame);
+    if (frame % 2 == 1) wrong.emplace_back(wrong.front().first + 3, 0.0);
+    return wrong;
+  };
+  EXPECT_NEAR(independence_among_others(with_another), independence_among_others(street), 1e-3);
 }
 
 }  // namespace

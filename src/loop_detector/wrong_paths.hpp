@@ -8,6 +8,9 @@
 
 namespace loopbit {
 
+/// A path moves by so many steps per step, at most.
+inline constexpr std::ptrdiff_t kMaxMove = 2;
+
 /// A value of each step, in the order of the steps.
 using ByStep = std::vector<std::pair<std::ptrdiff_t, double>>;
 
@@ -54,7 +57,6 @@ template <typename Items, typename StepOf, typename IsBetter>
 auto next_to(const Items& items, std::ptrdiff_t step, const StepOf& step_of,
              const IsBetter& is_better) {
   constexpr std::ptrdiff_t kMinMove = 1;
-  constexpr std::ptrdiff_t kMaxMove = 2;
   auto best = items.end();
   for (auto at = items.begin(); at != items.end(); ++at) {
     const std::ptrdiff_t ahead = step_of(*at) - step;
