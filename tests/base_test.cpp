@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -41,6 +42,12 @@ TEST(Printable, TextStaysAsItIs) {
 TEST(Printable, JsonKeepsItsMeaning) {
   EXPECT_EQ(printable_json("{\n  \"a\\u001b\": \"\x7F\xC2\x9B\xC3\x9F\"\n}"),
             "{\n  \"a\\u001b\": \"\\u007f\\u009b\xC3\x9F\"\n}");
+}
+
+TEST(Printable, OneThingHasNoPlural) {
+  EXPECT_EQ(counted(0, "frame"), "0 frames");
+  EXPECT_EQ(counted(1, "wrong loop"), "1 wrong loop");
+  EXPECT_EQ(counted(std::size_t{2}, "frame"), "2 frames");
 }
 
 class ReadFile : public test::ScratchTest {};

@@ -181,10 +181,10 @@ class CommandLineTest(CommandTest):
         images = self.few_images()
         for mask, parts in ((self.mask(width=640), ("640 x 240 px, but the images have 320 x 240",)),
                             (self.mask(maximum=65535), ("16 bits per pixel",)),
-                            (self.mask(dark_rows=240), ("0 everywhere",)),
+                            (self.mask(dark_rows=240), ("black everywhere", ".pgm'")),
                             (self.scratch / "no.png", ("no.png", "cannot be found"))):
             ran = loopbit("run", images, "--out", self.out, "--mask", mask)
-            self.assert_fails(ran, 2 if parts == ("0 everywhere",) else 3, *parts)
+            self.assert_fails(ran, 3, *parts)
         self.assertFalse(self.out.exists())
 
     @repeats_when_sanitized
@@ -530,7 +530,7 @@ class CommandLineTest(CommandTest):
         (folder / "1.png").write_bytes(b"")
         ran = loopbit("run", folder, "--out", self.out)
         self.assertEqual(ran.returncode, 3)
-        self.assertIn("None of the 1 frames", ran.stderr)
+        self.assertIn("No frame of", ran.stderr)
         self.assertEqual(rows(self.out)[0]["status"], "unreadable")
 
     def pictures(self):

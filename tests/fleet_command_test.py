@@ -148,7 +148,7 @@ class FleetTest(CommandTest):
         merged = self.lines("map", "merge", copy, self.file)
         self.assertEqual(without(merged[0], self.file), without(
             self.lines("map", "merge", back, copy)[0], self.server.address("copy", password=None)))
-        self.assertIn("2 sessions were already there", self.lines("map", "merge", back, self.file)[0])
+        self.assertIn("already there: 2 sessions", self.lines("map", "merge", back, self.file)[0])
         for command in ("export", "list", "check"):
             expected = self.lines("map", command, self.file)
             self.assertEqual(self.lines("map", command, copy), expected)
@@ -282,7 +282,7 @@ class FleetTest(CommandTest):
         self.assertEqual(record["map"]["queue"], str(queue))
         self.assertGreater(record["map"]["queued_frames"], 0)
         self.assertIn("whole", self.lines("map", "check", queue)[-1])
-        self.assertRegex(self.lines("map", "merge", address, queue)[0], "the rest of 1 sessions")
+        self.assertRegex(self.lines("map", "merge", address, queue)[0], "the rest of 1 session")
         self.assert_all_is_saved(address.rsplit("/", 1)[1], out)
         exported = self.lines("map", "export", address)
         self.assertIn(": 0 sessions, 0 places, 0 loops", self.lines("map", "merge", address, queue)[0])
@@ -362,7 +362,7 @@ class FleetTest(CommandTest):
         self.assertIn("free space or memory on the server", stderr)
         self.assertNotIn("unverified", json.loads((out / "run.json").read_text())["map"])
         self.server.sql("filled", "DROP TRIGGER fail ON loopbit.features")
-        self.assertRegex(self.lines("map", "merge", address, out / "queue.db")[0], "the rest of 1 sessions")
+        self.assertRegex(self.lines("map", "merge", address, out / "queue.db")[0], "the rest of 1 session")
         self.assert_all_is_saved("filled", out)
 
     @unittest.skipUnless(SEARCH, "the extension was not built")
@@ -572,12 +572,12 @@ class FleetTest(CommandTest):
 
         self.server.sql("shard2", "UPDATE loopbit.features SET features = set_byte(features, 100, 255 - "
                         "get_byte(features, 100)) WHERE place = (1::bigint << 32) + 3")    # it is copied again
-        self.assertEqual(self.lines(*move)[0], f"moved      1 sessions, {HALF} places")
+        self.assertEqual(self.lines(*move)[0], f"moved      1 session, {HALF} places")
         self.assertEqual(self.sessions(first, second), [[], [1, 2]])
         for command in ("check", "export"):
             self.assertEqual(sorted(self.lines("map", command, second)), sorted(self.lines("map", command, one)))
         self.assertEqual(self.server.sql("shard2", "SELECT owner FROM loopbit.session WHERE session = 1"), "robot1\n")
-        self.assertIn("0 sessions, 0 places; 1 sessions were there already", self.lines(*move)[0])
+        self.assertIn("0 sessions, 0 places; already there: 1 session", self.lines(*move)[0])
         self.assert_fails(loopbit("map", "merge", first, self.shared / "first.db"), 4,
                           "session 1 was moved to another server")
 

@@ -407,7 +407,7 @@ class MapCommandTest(CommandTest):
     def test_merge_compact_and_check(self):
         merged = self.scratch / "merged.db"
         self.assertIn("2 sessions", loopbit("map", "merge", merged, self.map).stdout)
-        self.assertIn("2 sessions were already there",
+        self.assertIn("already there: 2 sessions",
                       loopbit("map", "merge", merged, self.map).stdout)
         self.assertIn(f"{FRAMES} places", loopbit("map", "check", merged).stdout)
         self.assertIn(f"20 of {FRAMES} kept",
@@ -434,7 +434,7 @@ class MapCommandTest(CommandTest):
         self.assertEqual(linked.returncode, 0, linked.stderr)
         self.assertGreater(len(loops(met)), LAP // 2)
         self.assertEqual(loops(first), loops(met))
-        self.assertIn(f"1 sessions, {LAP} places: {len(loops(met))} new loops", linked.stdout)
+        self.assertIn(f"1 session, {LAP} places: {len(loops(met))} new loops", linked.stdout)
         before = first.read_bytes()
         again = loopbit("map", "link", first)
         self.assertIn("all sessions were compared", again.stdout)
@@ -467,7 +467,7 @@ class MapCommandTest(CommandTest):
             if ended >= {130, -signal.SIGKILL} and attempt >= 5:
                 break
         self.assertGreaterEqual(ended, {130, -signal.SIGKILL})
-        self.assertIn("1 sessions", loopbit("map", "link", merged).stdout)
+        self.assertIn("1 session", loopbit("map", "link", merged).stdout)
 
     def test_damage_is_listed_recovered_and_never_written_to(self):
         copy = self.copy_of_map()

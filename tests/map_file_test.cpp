@@ -301,6 +301,15 @@ TEST_F(MapFile, AMapThatMayNotBeReadIsNotCalledDamaged) {
                [&] { const MapWriter map(map_path_, fast_options(), "drive"); });
 }
 
+TEST_F(MapFile, ANewMapInAFolderThatMayNotBeWrittenSaysSo) {
+  const std::string folder = path("theirs");
+  fs::create_directory(folder);
+  fs::permissions(fs::path(folder).parent_path(), fs::perms::all);
+  const OrdinaryUser user;
+  expect_error(ErrorKind::output, {"theirs/new.db", "Permission denied"},
+               [&] { const MapWriter map(folder + "/new.db", fast_options(), "drive"); });
+}
+
 TEST_F(MapFile, ANewerVersionIsRefused) {
   add_session(map_path_, 1);
   change(map_path_, "PRAGMA user_version = 5");

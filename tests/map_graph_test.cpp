@@ -139,7 +139,7 @@ TEST_F(MapGraphTest, CorrectsBothSessionsInOneFrame) {
   drive_twice();
   const std::string before = read_bytes(map_path_);
   MapReader map(map_path_);
-  const MapCorrection result = correct_map(map, path(""));
+  const MapCorrection result = correct_map(map, path("graph"));
   EXPECT_EQ(result.correction.keyframes, 2 * kLapFrames);
   EXPECT_EQ(result.correction.kept(), kRight);
   EXPECT_EQ(result.correction.unjudged, 0);
@@ -149,24 +149,24 @@ TEST_F(MapGraphTest, CorrectsBothSessionsInOneFrame) {
   ASSERT_EQ(result.sessions.size(), 2U);
   EXPECT_EQ(result.sessions[1].keyframes, kLapFrames);
   EXPECT_EQ(result.sessions[1].frame_of, 1);
-  EXPECT_LT(error_of(path(""), 2), 0.5 * odometry_error());
+  EXPECT_LT(error_of(path("graph"), 2), 0.5 * odometry_error());
   EXPECT_EQ(read_bytes(map_path_), before) << "it was only read";
 }
 
 TEST_F(MapGraphTest, FilesNameFramesBySession) {
   drive_twice();
   MapReader map(map_path_);
-  (void)correct_map(map, path(""));
-  const auto trajectory = lines_of(path("trajectory.csv"));
+  (void)correct_map(map, path("graph"));
+  const auto trajectory = lines_of(path("graph/trajectory.csv"));
   ASSERT_EQ(trajectory.size(), 1 + 2 * std::size_t{kLapFrames});
   EXPECT_EQ(trajectory[1].substr(0, 33), "1:0,0,100.0000,0.0000,0.0000,100.");
   EXPECT_EQ(trajectory[kLapFrames + 3].substr(0, 7), "2:2,62,");
-  const auto loops = lines_of(path("judged_loops.csv"));
+  const auto loops = lines_of(path("graph/judged_loops.csv"));
   ASSERT_EQ(loops.size(), std::size_t{kRight} + 2);
   EXPECT_EQ(loops[1].substr(0, 21), "2:0,1:0,kept,metric,,") << "odometry joins no sessions";
   EXPECT_EQ(loops[12].substr(0, 10), "2:21,1:50,");
-  EXPECT_EQ(lines_of(path("corrected_2.kitti")).size(), std::size_t{kLapFrames});
-  const LoopGraph written = read_g2o(path("graph.g2o"));
+  EXPECT_EQ(lines_of(path("graph/corrected_2.kitti")).size(), std::size_t{kLapFrames});
+  const LoopGraph written = read_g2o(path("graph/graph.g2o"));
   EXPECT_EQ(written.size(), 2 * kLapFrames);
   EXPECT_EQ(written.loops().size(), std::size_t{kRight} + 1);
   EXPECT_FALSE(written.odometry(kLapFrames)) << "another session begins";
@@ -178,14 +178,14 @@ TEST_F(MapGraphTest, SessionsThatNothingJoinsStayInTheirOwnFrames) {
   drive({{10, {1, 10}}}, false);
   drive({{10, {3, 10}}, {12, {3, 12}}, {14, {3, 14}}, {16, {3, 16}}});
   MapReader map(map_path_);
-  const MapCorrection result = correct_map(map, path(""));
+  const MapCorrection result = correct_map(map, path("graph"));
   std::vector<int> frames;
   for (const MapCorrection::Session& session : result.sessions) frames.push_back(session.frame_of);
   EXPECT_EQ(frames, (std::vector<int>{1, 1, 3, 0, 3}));
   EXPECT_EQ(result.sessions[3].keyframes, 0);
   EXPECT_EQ(result.correction.unjudged, 1);
-  EXPECT_FALSE(fs::exists(path("corrected_4.tum")));
-  EXPECT_EQ(lines_of(path("corrected_3.tum"))[1].substr(0, 18), "0.000000 100 0 0 0")
+  EXPECT_FALSE(fs::exists(path("graph/corrected_4.tum")));
+  EXPECT_EQ(lines_of(path("graph/corrected_3.tum"))[1].substr(0, 18), "0.000000 100 0 0 0")
       << "as its odometry";
 }
 
@@ -231,8 +231,8 @@ TEST_F(MapGraphTest, WithoutOdometryThereIsNothingToCorrect) {
   drive({}, false);
   MapReader map(map_path_);
   expect_error(ErrorKind::input, {map_path_, "no odometry", "--odometry FILE"},
-               [&] { (void)correct_map(map, path("")); });
-  EXPECT_FALSE(fs::exists(path("graph.g2o")));
+               [&] { (void)correct_map(map, path("graph")); });
+  EXPECT_FALSE(fs::exists(path("graph")));
 }
 
 }  // namespace

@@ -205,7 +205,7 @@ TEST_F(RecordRunTest, FilesDoNotCountFromTheMiddle) {
   RunInput input(std::make_unique<ThreeViews>(), "views");
   EXPECT_TRUE(input.skip());
   request_.scoring.truth = write("truth.csv", "2,0\n");
-  test::expect_error(ErrorKind::option, {"truth.csv", "1 frames of 'views'", "open it again"},
+  test::expect_error(ErrorKind::option, {"truth.csv", "1 frame of 'views'", "open it again"},
                      [&] { record_run(input, request_, listener_, kNeverStop); });
   request_.scoring.truth.clear();
   EXPECT_EQ(record_run(input, request_, listener_, kNeverStop).detections.size(), 2U);
@@ -248,8 +248,7 @@ class BadBegin final : public ImageSource {
 
 TEST_F(RecordRunTest, ARunWithoutAReadableFrameIsRefusedWhenItHasEnded) {
   request_.map = path("town.db");
-  test::expect_error(ErrorKind::input, {"None of the 2 frames", "'views'"},
-                     [&] { run(BadBegin(false)); });
+  test::expect_error(ErrorKind::input, {"No frame", "'views'"}, [&] { run(BadBegin(false)); });
   EXPECT_EQ(read_run(path("run")).detections.size(), 2U);
   const MapWriter next(path("town.db"), test::fast_options(), "next");
   request_.map.clear();
@@ -274,11 +273,11 @@ TEST(RunInput, AProvenInputGivesTheSameFrames) {
   EXPECT_FALSE(input.skip());
   EXPECT_EQ(input.taken(), 2U + kFrames);
   RunInput tiny(std::make_unique<TinyViews>(), "views");
-  test::expect_error(ErrorKind::input, {"None of the 2 frames of 'views'", "'tiny'", "20 x 20"},
+  test::expect_error(ErrorKind::input, {"No frame of 'views'", "'tiny'", "20 x 20"},
                      [&] { tiny.prove(); });
   RunInput bad(std::make_unique<BadBegin>(false), "views");
   for (int i = 0; i < 2; ++i) {
-    test::expect_error(ErrorKind::input, {"None of the 2 frames of 'views'", "It is no image."},
+    test::expect_error(ErrorKind::input, {"No frame of 'views'", "It is no image."},
                        [&] { bad.prove(); });
   }
 }

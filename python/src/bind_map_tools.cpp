@@ -125,9 +125,9 @@ void bind_correction(py::module_& module) {
       },
       py::arg("map"), py::arg("folder") = py::none(), Free(),
       "Solves the pose graph of all sessions of a map that have odometry. Writes the corrected "
-      "trajectories, the graph and the evidence for each loop to an existing folder, if one is "
-      "given, as loopbit graph does. The map is only read. Raises InputError if no frame has "
-      "odometry.");
+      "trajectories, the graph and the evidence for each loop to a new folder, if one is given, as "
+      "loopbit graph does. The map is only read. Raises InputError if no frame has odometry, and "
+      "OutputError if the folder has files.");
   module.def(
       "reject_loops",
       [](const Path& path, const std::vector<LoopPair>& pairs) {

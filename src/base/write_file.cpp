@@ -45,6 +45,16 @@ void write_file(const std::string& path, std::string_view bytes) {
   }
 }
 
+void make_new_folder(const std::string& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  const bool is_empty = !error && fs::is_empty(folder, error);
+  if (error) throw cannot_write(folder, error.value());
+  if (is_empty) return;
+  throw Error(ErrorKind::output,
+              fmt::format("'{}' has files that could be replaced; give a new folder.", folder));
+}
+
 std::string resolved_path(const std::string& path) {
   constexpr int kMaxLinks = 40;  // as many as Linux follows
   std::error_code error;

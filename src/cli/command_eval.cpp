@@ -27,13 +27,11 @@ struct EvalFlags {
   bool json = false;
 };
 
-const char* plural(std::int64_t n) { return n == 1 ? "" : "s"; }
-
 void print_decision(const DecisionCounts& counts) {
   const int judged = counts.right + counts.wrong;
   fmt::print("decided    {} of {} revisits found: recall {}\n", counts.right, counts.positives,
              share_text(counts.recall(), counts.positives, 4));
-  fmt::print("           {} wrong loop{}: precision {}", counts.wrong, plural(counts.wrong),
+  fmt::print("           {}: precision {}", counted(counts.wrong, "wrong loop"),
              share_text(counts.precision(), judged, 4));
   if (judged > 0) {
     const Interval interval = counts.precision_interval();
@@ -41,8 +39,8 @@ void print_decision(const DecisionCounts& counts) {
   }
   fmt::print("\n");
   if (counts.tolerated + counts.ignored > 0) {
-    fmt::print("           {} loop{} tolerated, {} quer{} ignored\n", counts.tolerated,
-               plural(counts.tolerated), counts.ignored, counts.ignored == 1 ? "y" : "ies");
+    fmt::print("           {} tolerated, {} ignored\n", counted(counts.tolerated, "loop"),
+               counted(counts.ignored, "frame"));
   }
 }
 
@@ -106,7 +104,7 @@ void eval_command(const EvalFlags& flags) {
     fmt::print("protocol   {}\n", described(protocol));
   }
   if (run.evaluation.tolerance_frames > 0) {
-    fmt::print("tolerance  {} frames\n", run.evaluation.tolerance_frames);
+    fmt::print("tolerance  {}\n", counted(run.evaluation.tolerance_frames, "frame"));
   }
   print_decision(evaluation.decision);
   print_late(evaluation);

@@ -78,14 +78,14 @@ void print_sessions(const std::vector<MapCorrection::Session>& sessions) {
 
 void print_summary(const MapCorrection& result, const GraphFlags& flags) {
   const Correction& correction = result.correction;
-  fmt::print("map        {}, {} session{}, {} frames with odometry\n", printable(flags.map),
-             result.sessions.size(), result.sessions.size() == 1 ? "" : "s", correction.keyframes);
+  fmt::print("map        {}, {}, {} with odometry\n", printable(flags.map),
+             counted(result.sessions.size(), "session"), counted(correction.keyframes, "frame"));
   print_sessions(result.sessions);
-  fmt::print("graph      {} loops kept, {} rejected{}\n", correction.kept(), correction.rejected(),
-             evidence_text(correction));
+  fmt::print("graph      {} kept, {} rejected{}\n", counted(correction.kept(), "loop"),
+             correction.rejected(), evidence_text(correction));
   if (correction.unjudged > 0) {
-    fmt::print("           {} loops of frames without odometry are not judged\n",
-               correction.unjudged);
+    fmt::print("           not judged: {} of frames without odometry\n",
+               counted(correction.unjudged, "loop"));
   }
   if (!flags.out.empty()) {
     fmt::print("written    {0}/corrected_SESSION.tum, {0}/graph.g2o, {0}/judged_loops.csv\n",
@@ -93,7 +93,7 @@ void print_summary(const MapCorrection& result, const GraphFlags& flags) {
   }
   if (result.rejected.empty()) return;
   if (flags.reject) {
-    fmt::print("rejected   {} loops, also in the map\n", result.rejected.size());
+    fmt::print("rejected   {}, also in the map\n", counted(result.rejected.size(), "loop"));
   } else {
     fmt::print("next       loopbit graph {} --reject withdraws the rejected loops in the map\n",
                printable(flags.map));
@@ -106,7 +106,6 @@ void graph_command(const GraphFlags& flags) {
   {
     MapReader map(flags.map);
     shown.map = map.path();  // without a password
-    if (!flags.out.empty()) make_new_folder(flags.out);
     result = correct_map(map, flags.out);
     warn_of_damage(map);
   }

@@ -113,16 +113,16 @@ void show_info(const std::string& path, Json* json) {
                  static_cast<double>(bytes) / 1e3 / static_cast<double>(places));
     fmt::print("\nsessions   {}\nplaces     {}\nloops      {}\n", map.sessions().size(), places,
                loops);
-    if (rejected > 0) fmt::print("rejected   {} loops\n", rejected);
-    if (odometry > 0) fmt::print("odometry   {} frames\n", odometry);
-    if (poses > 0) fmt::print("poses      {} loops\n", poses);
+    if (rejected > 0) fmt::print("rejected   {}\n", counted(rejected, "loop"));
+    if (odometry > 0) fmt::print("odometry   {}\n", counted(odometry, "frame"));
+    if (poses > 0) fmt::print("poses      {}\n", counted(poses, "loop"));
     if (images.number > 0) {
       fmt::print("images     {}, {:.1f} MB\n", images.number,
                  static_cast<double>(images.bytes) / 1e6);
     }
     for (const MapSession& session : map.sessions()) {
-      fmt::print("  {:>9} {} ({}, {} frames)\n", session.session, printable(session.name),
-                 session.started, session.frames);
+      fmt::print("  {:>9} {} ({}, {})\n", session.session, printable(session.name), session.started,
+                 counted(session.frames, "frame"));
     }
     tell_unlinked(map);
   }
@@ -178,9 +178,12 @@ int list_command(const std::string& path, bool json) {
 void merge_command(const std::string& into, const std::vector<std::string>& others) {
   for (const std::string& other : others) {
     const MergeCounts counts = merge_map(into, other);
-    fmt::print("merged     {}: {} sessions, {} places, {} loops", printable(without_secrets(other)),
-               counts.sessions, counts.places, counts.loops);
-    if (counts.continued > 0) fmt::print("; the rest of {} sessions", counts.continued);
+    fmt::print("merged     {}: {}, {}, {}", printable(without_secrets(other)),
+               counted(counts.sessions, "session"), counted(counts.places, "place"),
+               counted(counts.loops, "loop"));
+    if (counts.continued > 0) {
+      fmt::print("; the rest of {}", counted(counts.continued, "session"));
+    };
     if (counts.known > 0) fmt::print("; {} sessions were already there", counts.known);
     fmt::print("\n");
   }
@@ -190,8 +193,11 @@ void merge_command(const std::string& into, const std::vector<std::string>& othe
 void move_command(const std::string& from, const std::string& to,
                   const std::vector<int>& sessions) {
   const MoveCounts counts = move_sessions(from, to, sessions);
-  fmt::print("moved      {} sessions, {} places", counts.sessions, counts.places);
-  if (counts.known > 0) fmt::print("; {} sessions were there already", counts.known);
+  fmt::print("moved      {}, {}", counted(counts.sessions, "session"),
+             counted(counts.places, "place"));
+  if (counts.known > 0) {
+    fmt::print("; already there: {}", counted(counts.known, "session"));
+  };
   fmt::print("\n");
   tell_unlinked(MapReader(to));
 }
@@ -211,8 +217,8 @@ int link_command(const std::string& path) {
     fmt::print("linked     all sessions were compared with the earlier ones before\n");
     return success;
   }
-  fmt::print("linked     {} sessions, {} places: {} new loops\n", counts.sessions, counts.places,
-             counts.loops);
+  fmt::print("linked     {}, {}: {}\n", counted(counts.sessions, "session"),
+             counted(counts.places, "place"), counted(counts.loops, "new loop"));
   if (counts.places == counts.total_places) return success;
   tell("loopbit: Stopped. What is linked is saved; the same command does the rest.\n");
   return interrupted;
@@ -240,8 +246,9 @@ void images_command(const std::string& path, const std::string& folder) {
 int check_one(const std::string& path, const std::string& recover) {
   const MapCheck check = recover.empty() ? check_map(path) : recover_map(path, recover);
   for (const std::string& clause : check.damage) fmt::print("damaged    {}\n", clause);
-  fmt::print("whole      {} sessions, {} places, {} loops, {} images\n", check.sessions,
-             check.places, check.loops, check.images);
+  fmt::print("whole      {}, {}, {}, {}\n", counted(check.sessions, "session"),
+             counted(check.places, "place"), counted(check.loops, "loop"),
+             counted(check.images, "image"));
   if (!recover.empty()) {
     fmt::print("written    {}\n", recover);
     return success;

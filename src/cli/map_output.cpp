@@ -16,16 +16,6 @@ namespace loopbit::cli {
 
 namespace fs = std::filesystem;
 
-void make_new_folder(const std::string& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  const bool is_empty = !error && fs::is_empty(folder, error);
-  if (error) throw cannot_write(folder, error.value());
-  if (is_empty) return;
-  throw Error(ErrorKind::output,
-              fmt::format("'{}' has files that could be replaced; give a new folder.", folder));
-}
-
 void warn_of_damage(const MapReader& map) { warn_of_damage(map.path(), map.damage()); }
 
 void warn_of_damage(const std::string& path, const std::vector<std::string>& damage) {

@@ -19,9 +19,6 @@ void warn_of_damage(const MapReader& map);
 /// The same for a map that was also written.
 void warn_of_damage(const std::string& path, const std::vector<std::string>& damage);
 
-/// Makes a folder for files. Throws Error (kind output) if it cannot, or if there are files in it.
-void make_new_folder(const std::string& folder);
-
 /// Writes images of a map as files SESSION_FRAME.jpg to a new folder, each on first use. The map
 /// must outlive it.
 class PlaceImages {

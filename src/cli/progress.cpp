@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "loopbit/printable.hpp"
+
 #include "process.hpp"
 
 namespace loopbit::cli {
@@ -65,13 +67,12 @@ std::string Progress::line() const {
   const double rate = static_cast<double>(frames_) / std::max(elapsed_s, 1e-9);
   std::array<std::string, 4> facts;
   auto& [count, speed, left, loops] = facts;
-  count =
-      total_ ? fmt::format("{} of {} frames", frames_, *total_) : fmt::format("{} frames", frames_);
+  count = total_ ? fmt::format("{} of {} frames", frames_, *total_) : counted(frames_, "frame");
   speed = fmt::format(", {:.1f} frames/s", rate);
   if (total_ && *total_ >= frames_) {
     left = fmt::format(", {} left", clock_time(static_cast<double>(*total_ - frames_) / rate));
   }
-  if (style_.of_detection) loops = fmt::format(", {} loop{}", loops_, loops_ == 1 ? "" : "s");
+  if (style_.of_detection) loops = fmt::format(", {}", counted(loops_, "loop"));
   if (!on_terminal_) return fmt::format("{}", fmt::join(facts, ""));
 
   // One less than fits, because some terminals wrap a full line.

@@ -34,11 +34,11 @@ void print_changes(const std::vector<Detection>& detections, std::size_t rejecte
 
 /// What the pose graph made of the loops, and of the trajectory.
 void print_correction(const Correction& correction, const std::string& folder) {
-  fmt::print("graph      {} loops kept, {} rejected and withdrawn{}\n", correction.kept(),
-             correction.rejected(), evidence_text(correction));
+  fmt::print("graph      {} kept, {} rejected and withdrawn{}\n",
+             counted(correction.kept(), "loop"), correction.rejected(), evidence_text(correction));
   if (correction.unjudged > 0) {
-    fmt::print("           {} loops of frames without odometry are not judged\n",
-               correction.unjudged);
+    fmt::print("           not judged: {} of frames without odometry\n",
+               counted(correction.unjudged, "loop"));
   }
   if (correction.odometry_error_m && correction.corrected_error_m) {
     fmt::print("           trajectory error: {:.3f} m by odometry, {:.3f} m corrected\n",
@@ -86,26 +86,29 @@ void print_revisits(const std::vector<Detection>& detections) {
 
 void print_score(const Evaluation& evaluation) {
   const DecisionCounts& score = evaluation.decision;
-  fmt::print("truth      {} of {} revisits found: recall {}; {} wrong loop{}: precision {}\n",
-             score.right, score.positives, share_text(score.recall(), score.positives, 3),
-             score.wrong, score.wrong == 1 ? "" : "s",
+  fmt::print("truth      {} of {} revisits found: recall {}; {}: precision {}\n", score.right,
+             score.positives, share_text(score.recall(), score.positives, 3),
+             counted(score.wrong, "wrong loop"),
              share_text(score.precision(), score.right + score.wrong, 3));
   const DecisionCounts& late = evaluation.late;
   if (late.right != score.right || late.wrong != score.wrong) {
     fmt::print("           with late and without withdrawn loops: recall {}; {} wrong\n",
                share_text(late.recall(), late.positives, 3), late.wrong);
   }
-  if (score.ignored > 0) fmt::print("           {} frames are not scored\n", score.ignored);
+  if (score.ignored > 0) {
+    fmt::print("           not scored: {}\n", counted(score.ignored, "frame"));
+  }
 }
 
 void print_times(const RunRecord& record, const std::vector<Detection>& detections) {
   const auto mean = [&](double StepTimes::*step) { return summarize(detections, step).mean; };
   fmt::print(
-      "speed      {:.1f} frames/s with {} thread{}; mean per frame: content {:.2f} ms, "
+      "speed      {:.1f} frames/s with {}; mean per frame: content {:.2f} ms, "
       "retrieval {:.2f} ms, features {:.2f} ms, verification {:.2f} ms\n",
-      static_cast<double>(detections.size()) / std::max(record.wall_s, 1e-9), record.threads,
-      record.threads == 1 ? "" : "s", mean(&StepTimes::content_ms), mean(&StepTimes::retrieval_ms),
-      mean(&StepTimes::features_ms), mean(&StepTimes::verification_ms));
+      static_cast<double>(detections.size()) / std::max(record.wall_s, 1e-9),
+      counted(record.threads, "thread"), mean(&StepTimes::content_ms),
+      mean(&StepTimes::retrieval_ms), mean(&StepTimes::features_ms),
+      mean(&StepTimes::verification_ms));
 }
 
 }  // namespace
@@ -128,13 +131,13 @@ std::string share_text(double share, std::int64_t whole, int decimals) {
 void print_summary(const RunOutcome& run, const std::string& report) {
   const RunRecord& record = run.record;
   const auto& detections = run.detections;
-  fmt::print("input      {} ({}), {} frames{}{}\n", printable(record.input),
-             printable(record.description), detections.size(),
+  fmt::print("input      {} ({}), {}{}{}\n", printable(record.input), printable(record.description),
+             counted(detections.size(), "frame"),
              record.stopped_by == "interrupt" ? ", then interrupted" : "",
              record.early_end.empty() ? "" : ", then cut off");
   const auto loops = count(detections, Status::loop);
   const auto elsewhere = match_list(detections).elsewhere.size();
-  fmt::print("loops      {} frame{} at a place seen before{}\n", loops, loops == 1 ? "" : "s",
+  fmt::print("loops      {} at a place seen before{}\n", counted(loops, "frame"),
              elsewhere == 0 ? "" : fmt::format(", {} in earlier sessions of the map", elsewhere));
   print_revisits(detections);
   const auto& correction = record.correction;

@@ -8,8 +8,10 @@
 #include <system_error>
 #include <utility>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
 #include "loopbit/error.hpp"
 
@@ -33,10 +35,16 @@ bool is_forbidden(sqlite3* handle) {
 }
 
 /// Of the last failure: the system's own words where a file could not be opened.
-const char* reason_of(sqlite3* handle) {
-  const int system_error = sqlite3_system_errno(handle);
-  const bool unopened = sqlite3_errcode(handle) == SQLITE_CANTOPEN && system_error != 0;
-  return unopened ? std::strerror(system_error) : sqlite3_errmsg(handle);
+const char* reason_of(sqlite3* handle, const std::string& path) {
+  int system_error = sqlite3_system_errno(handle);
+  if (sqlite3_errcode(handle) != SQLITE_CANTOPEN || system_error == 0)
+    return sqlite3_errmsg(handle);
+  if (system_error == ENOENT) {
+    // A file that cannot be made was then to be read only, which it cannot, either.
+    const auto folder = std::filesystem::absolute(path).parent_path();
+    if (faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) != 0) system_error = errno;
+  }
+  return std::strerror(system_error);
 }
 
 }  // namespace
@@ -92,7 +100,7 @@ void Database::set_schema_version(std::int32_t version) const {
 }
 
 void Database::fail() const {
-  const char* reason = handle_ ? reason_of(handle()) : "out of memory";
+  const char* reason = handle_ ? reason_of(handle(), path_) : "out of memory";
   const int code = handle_ ? sqlite3_errcode(handle()) : SQLITE_NOMEM;
   const bool unusable = code == SQLITE_CORRUPT || code == SQLITE_NOTADB;
   const bool writes = access_ == Access::create && !unusable;

@@ -14,6 +14,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/image_file.hpp"
+#include "loopbit/printable.hpp"
 
 #include "compression.hpp"
 #include "image_message.hpp"
@@ -342,8 +343,7 @@ std::string cut_off_after(std::uint64_t bytes) {
 
 std::string damaged_chunks(std::size_t count) {
   if (count == 0) return {};
-  return fmt::format("has {} damaged chunk{}, whose messages are missing", count,
-                     count == 1 ? "" : "s");
+  return fmt::format("has {}, whose messages are missing", counted(count, "damaged chunk"));
 }
 
 }  // namespace recordings

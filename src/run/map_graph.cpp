@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "session_graph.hpp"
 
@@ -70,6 +71,7 @@ MapCorrection correct_map(MapReader& map, const std::string& folder) {
   const std::vector<MapLoop> loops = add_loops(map, graph);
   graph.solve();
   if (!folder.empty()) {
+    make_new_folder(folder);
     std::map<int, std::int64_t> frames;
     for (const MapSession& session : map.sessions()) frames[session.session] = session.frames;
     graph.write(folder, frames);

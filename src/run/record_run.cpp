@@ -17,6 +17,7 @@
 #include "loopbit/image_file.hpp"
 #include "loopbit/map_server.hpp"
 #include "loopbit/picture_jpeg.hpp"
+#include "loopbit/printable.hpp"
 
 #include "depth_folder.hpp"
 #include "evidence_writer.hpp"
@@ -62,9 +63,9 @@ void check_from_start(const RunInput& input, const RunRequest& request) {
        {scoring.truth, scoring.not_false, scoring.ignore, request.poses, request.odometry}) {
     if (file.empty()) continue;
     throw Error(ErrorKind::option,
-                fmt::format("'{}' counts from the first frame, but {} frames of '{}' were already "
-                            "read; open it again.",
-                            file, input.taken(), input.input()));
+                fmt::format("'{}' counts from the first frame, but {} of '{}' was already read; "
+                            "open it again.",
+                            file, counted(input.taken(), "frame"), input.input()));
   }
 }
 
@@ -276,9 +277,10 @@ class RecordedRun {
     if (poses) poses_ = poses->poses();
     if (evidence) evidence->finish();
     if (!stop && are_unreadable(folder_.detections())) {
-      throw Error(ErrorKind::input, fmt::format("None of the {} frames of '{}' could be read; the "
-                                                "messages about them say why.",
-                                                folder_.detections().size(), input_.input()));
+      throw Error(ErrorKind::input,
+                  fmt::format("No frame of '{}' could be read; the messages about "
+                              "them say why.",
+                              input_.input()));
     }
   }
 
@@ -407,7 +409,12 @@ cv::Mat1b read_mask(const std::string& file) {
     throw Error(ErrorKind::input,
                 fmt::format("The mask '{}' has 16 bits per pixel; convert it to 8 bits.", file));
   }
-  return gray_image(image);
+  const cv::Mat1b mask = gray_image(image);
+  if (cv::countNonZero(mask) > 0) return mask;
+  throw Error(ErrorKind::input,
+              fmt::format("The mask '{}' is black everywhere, which excludes the whole image; "
+                          "pixels that count are not black.",
+                          file));
 }
 
 RunOutcome record_run(RunInput& input, const RunRequest& request, const RunListener& listener,

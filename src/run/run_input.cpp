@@ -40,9 +40,8 @@ const Frame& RunInput::prove() {
     if (frame.error.empty()) return ahead_.back();
   }
   throw Error(ErrorKind::input,
-              fmt::format("None of the {} frames of '{}' can be used, so no earlier run is "
-                          "replaced. {}",
-                          ahead_.size(), input_, ahead_.empty() ? "" : ahead_.front().error));
+              fmt::format("No frame of '{}' can be used, so no earlier run is replaced. {}", input_,
+                          ahead_.empty() ? "" : ahead_.front().error));
 }
 
 bool RunInput::next(Frame& frame) {

@@ -215,7 +215,6 @@ def test_sessions_are_corrected_together(town, images, tmp_path):
     assert np.array_equal(odometry["pose"], poses)
     assert odometry["covariance"].shape == (24, 6, 6) and (odometry["covariance"][:, 0, 0] > 0).all()
     folder = tmp_path / "graph"
-    folder.mkdir()
     result = loopbit.correct_map(map, folder)
     assert (result.keyframes, result.unjudged, result.rejected) == (24, 0, [])
     assert result.kept == len(map.loops()) > 5 and result.frame_of == {1: 1, 2: 1}
@@ -226,7 +225,10 @@ def test_sessions_are_corrected_together(town, images, tmp_path):
     loopbit.reject_loops(path, [pair])
     assert len(map.rejected_loops()) == 1 and loopbit.correct_map(map).kept == result.kept - 1
     with pytest.raises(loopbit.InputError, match="no odometry"):
-        loopbit.correct_map(loopbit.MapReader(town))
+        loopbit.correct_map(loopbit.MapReader(town), tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+    with pytest.raises(loopbit.OutputError, match="has files"):
+        loopbit.correct_map(map, folder)
 
 
 def test_session_frames_are_values():

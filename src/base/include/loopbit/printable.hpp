@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <concepts>
 #include <string>
 #include <string_view>
 
@@ -14,5 +15,10 @@ std::string printable(std::string_view text);
 /// The same JSON, fit for a terminal: DEL and C1, which JSON permits in strings, are written as
 /// "\u007f".
 std::string printable_json(std::string_view json);
+
+/// "1 frame", "2 frames".
+std::string counted(std::integral auto number, std::string_view thing) {
+  return std::to_string(number).append(" ").append(thing).append(number == 1 ? "" : "s");
+}
 
 }  // namespace loopbit

@@ -13,6 +13,9 @@ namespace loopbit {
 /// Symbolic links are kept, and devices and pipes are written directly. Throws Error (kind output).
 void write_file(const std::string& path, std::string_view bytes);
 
+/// Makes a folder for files. Throws Error (kind output) if it cannot, or if there are files in it.
+void make_new_folder(const std::string& folder);
+
 /// Resolves all symbolic links of `path`, whether the file exists or not. Returns `path` if the
 /// system cannot resolve it.
 std::string resolved_path(const std::string& path);

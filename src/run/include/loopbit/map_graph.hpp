@@ -29,9 +29,10 @@ struct MapCorrection {
 /// them, with the relative poses that were measured. The map is not changed; reject_loops() does
 /// that.
 ///
-/// `folder`: if not empty, trajectory.csv, judged_loops.csv, graph.g2o and, for each session with
-/// odometry, corrected_SESSION.tum are written there; see docs/run_folder.md. Throws Error: kind
-/// input if no frame has odometry, output if a file cannot be written.
+/// `folder`: if not empty, it is made, and trajectory.csv, judged_loops.csv, graph.g2o and, for
+/// each session with odometry, corrected_SESSION.tum are written there; see docs/run_folder.md.
+/// Throws Error: kind input if no frame has odometry, output if the folder has files or a file
+/// cannot be written.
 MapCorrection correct_map(MapReader& map, const std::string& folder = {});
 
 }  // namespace loopbit

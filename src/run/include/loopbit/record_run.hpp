@@ -69,7 +69,8 @@ struct RunRequest {
 };
 
 /// A mask for LoopDetector::set_mask() from an image file of 8 bits; colours become grey. Throws
-/// Error (kind input) if it cannot be read, has 16 bits or fewer than 32 x 32 pixels.
+/// Error (kind input) if it cannot be read, is black everywhere, has 16 bits or fewer than 32 x 32
+/// pixels.
 cv::Mat1b read_mask(const std::string& file);
 
 /// What came of a run.
