@@ -409,7 +409,7 @@ cv::Mat1b read_mask(const std::string& file) {
     throw Error(ErrorKind::input,
                 fmt::format("The mask '{}' has 16 bits per pixel; convert it to 8 bits.", file));
   }
-  const cv::Mat1b mask = gray_image(image);
+  cv::Mat1b mask = gray_image(image);
   if (cv::countNonZero(mask) > 0) return mask;
   throw Error(ErrorKind::input,
               fmt::format("The mask '{}' is black everywhere, which excludes the whole image; "
