@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "loopbit/loop_graph.hpp"
+#include "loopbit/median.hpp"
 
 #include "graph_impl.hpp"
 #include "pose_problem.hpp"
@@ -24,12 +25,6 @@ using Clock = std::chrono::steady_clock;
 
 double seconds_since(Clock::time_point begin) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  return *middle;
 }
 
 /// Sums over drives.

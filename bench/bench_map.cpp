@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <filesystem>
 #include <memory>
 #include <random>
@@ -22,6 +21,8 @@
 #include "loopbit/picture_jpeg.hpp"
 #include "loopbit/world.hpp"
 
+#include "measure.hpp"
+
 namespace {
 
 using loopbit::BinaryContent;
@@ -33,6 +34,7 @@ using loopbit::MapReader;
 using loopbit::MapWriter;
 using loopbit::PlaceId;
 using loopbit::SessionFrame;
+using loopbit::bench::thread_ms;
 using Clock = std::chrono::steady_clock;
 
 constexpr int kOpenings = 5;
@@ -41,13 +43,6 @@ constexpr std::size_t kFewFeatures = 20;
 
 double seconds_since(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-/// Time this thread was running, ms.
-double thread_ms() {
-  timespec time{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
 /// A camera's way: each content is the one before with some bits changed.

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -21,13 +20,13 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "loopbit/camera_file.hpp"
-#include "loopbit/error.hpp"
 #include "loopbit/gray_image.hpp"
 #include "loopbit/ground_truth.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/relative_pose.hpp"
 #include "loopbit/world.hpp"
 
+#include "measure.hpp"
 #include "orb_matching.hpp"
 
 namespace {
@@ -44,18 +43,12 @@ using loopbit::RelativePose;
 using loopbit::RelativePoseEstimator;
 using loopbit::World;
 using loopbit::WorldOptions;
+using loopbit::bench::thread_ms;
 
 constexpr double kDegrees = 180 / std::numbers::pi;
 constexpr double kStereo_m = 0.3;
 /// Pairs with fewer are no loops.
 constexpr std::size_t kLoopInliers = 25;
-
-/// Processor time of this thread, ms.
-double now_ms() {
-  timespec time{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) * 1e3 + static_cast<double>(time.tv_nsec) / 1e6;
-}
 
 CameraModel resolution(CameraModel camera, cv::Size size_px) {
   camera.size_px = size_px;
@@ -169,9 +162,9 @@ void Errors::print(const std::string& name) const {
 }
 
 RelativePose timed(RelativePoseEstimator& estimator, const PoseRequest& request, Errors& errors) {
-  const double start_ms = now_ms();
+  const double start_ms = thread_ms();
   RelativePose pose = estimator.estimate(request);
-  errors.time_ms.push_back(now_ms() - start_ms);
+  errors.time_ms.push_back(thread_ms() - start_ms);
   return pose;
 }
 
@@ -292,10 +285,10 @@ void bench_drive(const WorldOptions& options, int every, bool is_plain, WorldErr
     if (is_plain) {
       const auto a = loopbit::bench::orb(loopbit::gray_image(world.render(run.query)));
       const auto b = loopbit::bench::orb(loopbit::gray_image(world.render(match)));
-      const double start_ms = now_ms();
+      const double start_ms = thread_ms();
       const RelativePose plain =
           baseline_pose(a, b, match_camera, loopbit::bench::orb_inliers(a, b));
-      errors.baseline.time_ms.push_back(now_ms() - start_ms);
+      errors.baseline.time_ms.push_back(thread_ms() - start_ms);
       errors.baseline.add(plain, truth);
     }
     while (features.size() > 64) features.erase(features.begin());
@@ -508,10 +501,6 @@ void bench(int drives, const fs::path& data) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    bench(argc > 1 ? std::stoi(argv[1]) : 1, argc > 2 ? argv[2] : "");
-  } catch (const loopbit::Error& error) {
-    fmt::print(stderr, "bench_poses: {}\n", error.what());
-    return 1;
-  }
+  return loopbit::bench::run_main(
+      "bench_poses", [&] { bench(argc > 1 ? std::stoi(argv[1]) : 1, argc > 2 ? argv[2] : ""); });
 }

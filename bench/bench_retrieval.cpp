@@ -5,8 +5,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <ctime>
 #include <fstream>
 #include <memory>
 #include <stdexcept>
@@ -21,6 +19,7 @@
 #include "loopbit/place_index.hpp"
 
 #include "long_sequence.hpp"
+#include "measure.hpp"
 
 namespace {
 
@@ -38,20 +37,6 @@ constexpr std::size_t kFramesTimed = 50;
 
 double ms_since(Clock::time_point start) {
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-/// Time this thread was running: what other programs on the machine take is left out, and so is
-/// waiting for a disk.
-double thread_ms() {
-  timespec time{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
-}
-
-double percentile(std::vector<double> values, double fraction) {
-  std::sort(values.begin(), values.end());
-  const auto at = std::lround(fraction * static_cast<double>(values.size() - 1));
-  return values[static_cast<std::size_t>(at)];
 }
 
 /// Memory of this process that no file backs, in bytes.
@@ -317,7 +302,7 @@ void run_faiss(LongSequence& map, const LongSequence& elsewhere, std::vector<Row
 }
 
 /// bench_retrieval DATA FOLDER SIZE ...: see the script.
-int run(const std::vector<std::string>& arguments) {
+void run(const std::vector<std::string>& arguments) {
   if (arguments.size() < 3) throw std::runtime_error("usage: bench_retrieval DATA FOLDER SIZE ...");
   std::vector<std::size_t> sizes;
   for (auto size = arguments.begin() + 2; size != arguments.end(); ++size) {
@@ -339,16 +324,10 @@ int run(const std::vector<std::string>& arguments) {
         row.places, row.p50_ms, row.p99_ms, row.full_scan_ms, row.faiss_ms, row.bytes_per_place,
         row.add_p99_us);
   }
-  return EXIT_SUCCESS;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run(std::vector<std::string>(argv + 1, argv + argc));
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "bench_retrieval: {}\n", error.what());
-    return EXIT_FAILURE;
-  }
+  return loopbit::bench::run_main("bench_retrieval", [&] { run({argv + 1, argv + argc}); });
 }

@@ -3,7 +3,6 @@
 // A robot of a fleet, whose camera gives frames at a steady rate: see scripts/bench_fleet.
 #include <chrono>
 #include <cstddef>
-#include <cstdlib>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -18,6 +17,8 @@
 #include "loopbit/map_file.hpp"
 #include "loopbit/place_index.hpp"
 #include "loopbit/surf.hpp"
+
+#include "measure.hpp"
 
 namespace {
 
@@ -121,11 +122,5 @@ void run(const std::vector<std::string>& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    run({argv + 1, argv + argc});
-    return EXIT_SUCCESS;
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "bench_robot: {}\n", error.what());
-    return EXIT_FAILURE;
-  }
+  return loopbit::bench::run_main("bench_robot", [&] { run({argv + 1, argv + argc}); });
 }

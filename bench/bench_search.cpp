@@ -3,8 +3,6 @@
 // How similar places are found by the extension of a PostgreSQL server: see scripts/bench_fleet.
 #include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <cstdlib>
 #include <functional>
 #include <memory>
 #include <stdexcept>
@@ -22,6 +20,7 @@
 #include "loopbit/sharded_map.hpp"
 
 #include "long_sequence.hpp"
+#include "measure.hpp"
 #include "place_contents.hpp"
 #include "place_memory.hpp"
 
@@ -40,12 +39,6 @@ double ms_of(const std::function<void()>& work) {
   const auto start = Clock::now();
   work();
   return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-double percentile(std::vector<double> values, double fraction) {
-  std::sort(values.begin(), values.end());
-  const auto at = std::lround(fraction * static_cast<double>(values.size() - 1));
-  return values[static_cast<std::size_t>(at)];
 }
 
 std::string hex_of(const BinaryContent& content) {
@@ -295,11 +288,5 @@ void run(const std::vector<std::string>& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    run({argv + 1, argv + argc});
-    return EXIT_SUCCESS;
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "bench_search: {}\n", error.what());
-    return EXIT_FAILURE;
-  }
+  return loopbit::bench::run_main("bench_search", [&] { run({argv + 1, argv + argc}); });
 }

@@ -4,27 +4,22 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include <fmt/core.h>
 
-#include "loopbit/error.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/instruction_set.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/world.hpp"
 
+#include "measure.hpp"
+
 namespace {
 
-/// Time this thread was running, ms.
-double thread_ms() {
-  timespec time{};
-  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
-}
+using loopbit::bench::thread_ms;
 
 /// The shortest times of one frame, ms.
 struct FrameTimes {
@@ -65,12 +60,12 @@ std::unique_ptr<loopbit::ImageSource> open(const std::string& input) {
   return loopbit::make_world_source(std::make_shared<const loopbit::World>(world));
 }
 
-int run(int argc, char** argv) {
+void run(int argc, char** argv) {
   if (argc < 3) {
     for (const auto set : loopbit::available_instruction_sets()) {
       fmt::print("{}\n", loopbit::to_string(set));
     }
-    return 0;
+    return;
   }
   std::vector<FrameTimes> times;
   const int repeat = std::atoi(argv[2]);
@@ -79,16 +74,10 @@ int run(int argc, char** argv) {
     fmt::print("{:.4f},{:.4f},{:.4f},{:.4f},{:.4f}\n", t.content, t.retrieval, t.features,
                t.verification, t.total);
   }
-  return 0;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  try {
-    return run(argc, argv);
-  } catch (const loopbit::Error& error) {
-    std::fprintf(stderr, "bench_speed: %s\n", error.what());
-    return 1;
-  }
+  return loopbit::bench::run_main("bench_speed", [&] { run(argc, argv); });
 }

@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -20,11 +19,13 @@
 #include "loopbit/image_source.hpp"
 #include "loopbit/kernels_for.hpp"
 #include "loopbit/loop_detector.hpp"
+#include "loopbit/median.hpp"
 #include "loopbit/surf.hpp"
 #include "loopbit/verification.hpp"
 
 #include "hessian_pyramid.hpp"
 #include "integral_image.hpp"
+#include "measure.hpp"
 #include "patch.hpp"
 #include "surf_kernels.hpp"
 #include "surf_peers.hpp"
@@ -35,23 +36,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Time of the processor spent by this thread: other programs' turns do not count.
-double cpu_ms() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) * 1e3 + static_cast<double>(now.tv_nsec) * 1e-6;
-}
-
 double time_ms(const std::function<void()>& action) {
-  const double start_ms = cpu_ms();
+  const double start_ms = thread_ms();
   action();
-  return cpu_ms() - start_ms;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return thread_ms() - start_ms;
 }
 
 double median_ms(int repeats, const std::function<void()>& action) {

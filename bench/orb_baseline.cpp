@@ -5,7 +5,6 @@
 //
 //   orb_baseline INPUT > loops.csv
 #include <cstdio>
-#include <exception>
 #include <vector>
 
 #include <fmt/core.h>
@@ -14,6 +13,7 @@
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 
+#include "measure.hpp"
 #include "orb_matching.hpp"
 
 namespace loopbit::bench {
@@ -53,10 +53,5 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "usage: orb_baseline INPUT > loops.csv\n");
     return 2;
   }
-  try {
-    loopbit::bench::detect(argv[1]);
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "orb_baseline: {}\n", error.what());
-    return 1;
-  }
+  return loopbit::bench::run_main("orb_baseline", [&] { loopbit::bench::detect(argv[1]); });
 }

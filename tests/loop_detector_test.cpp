@@ -346,12 +346,14 @@ TEST(LoopDetector, AMaskThatExcludesNothingChangesNothing) {
 
 TEST(LoopDetector, FeaturesMustBeWhole) {
   const Features whole = extract_surf(view(1));
-  std::vector<Features> broken(4, whole);
+  std::vector<Features> broken(5, whole);
   broken[0].num_dark = whole.keypoints.size() + 1;
   broken[1].keypoints.pop_back();
   broken[2].working_size_px = {};
   broken[3].keypoints.resize(40000);
   broken[3].descriptors.resize(40000);
+  broken[4] = {};
+  broken[4].working_size_px = {640, -480};
   LoopDetector detector(fast_options());
   for (const Features& features : broken) {
     expect_error(ErrorKind::input, {"keypoints", "not whole"},
@@ -498,6 +500,14 @@ TEST(LoopDetector, PresetCountsMatchesAlone) {
   EXPECT_EQ(detection.match, 3);
   EXPECT_EQ(detection.score, detection.matches);
   EXPECT_EQ(detection.inliers, 0);
+}
+
+TEST(LoopDetector, OdometryGoesWithAnyNumberOfCandidates) {
+  LoopDetectorOptions options = fast_options();
+  options.retrieval.max_candidates = kMaxCandidates;
+  LoopDetector detector(options);
+  const Detection detection = detector.process(view(0), std::nullopt, OdometryPose{});
+  EXPECT_EQ(detection.status, Status::no_earlier_place);
 }
 
 // Frames without a usable image

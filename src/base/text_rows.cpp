@@ -52,11 +52,7 @@ std::vector<TextRow> rows_of(std::string_view text) {
 constexpr std::string_view kBlanks = " \t";
 
 void split_at_commas(std::string_view row, std::vector<std::string_view>& cells) {
-  for (std::size_t comma = row.find(','); comma != std::string_view::npos; comma = row.find(',')) {
-    cells.push_back(trimmed(row.substr(0, comma)));
-    row.remove_prefix(comma + 1);
-  }
-  cells.push_back(trimmed(row));
+  for_each_part(row, ',', [&](std::string_view cell) { cells.push_back(trimmed(cell)); });
 }
 
 void split_at_blanks(std::string_view row, std::vector<std::string_view>& cells) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
-// What needs no image, and so nothing that is compiled of OpenCV.
+// Functions that need no image. server_search compiles this file, too, without OpenCV's libraries.
 #include <algorithm>
 #include <bit>
 #include <cassert>

@@ -142,9 +142,7 @@ void print_json(const std::vector<ComparedRun>& rows) {
     if (row.time) entry["time_ms"] = {{"mean", row.time->mean}, {"p99", row.time->p99}};
     json.push_back(entry);
   }
-  const std::string text =
-      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-  fmt::print("{}\n", printable_json(text));
+  print_document(json);
 }
 
 void write_plot(const std::string& file, const std::vector<ComparedRun>& rows) {

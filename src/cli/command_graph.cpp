@@ -15,6 +15,7 @@
 
 #include "commands.hpp"
 #include "map_output.hpp"
+#include "process.hpp"
 #include "summary.hpp"
 
 namespace loopbit::cli {
@@ -54,7 +55,7 @@ void print_json(const MapCorrection& result, const GraphFlags& flags) {
   for (const MapLoop& loop : result.rejected) {
     json["rejected"].push_back({{"query", json_of(loop.query)}, {"match", json_of(loop.match)}});
   }
-  fmt::print("{}\n", printable_json(json.dump(2, ' ', false, Json::error_handler_t::replace)));
+  print_document(json);
 }
 
 /// Which sessions have their corrected poses in one frame, and which have none.

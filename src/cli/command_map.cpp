@@ -29,10 +29,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-std::string dump(const Json& json) {
-  return printable_json(json.dump(2, ' ', false, Json::error_handler_t::replace));
-}
-
 /// Of each session, how many places, or loops with a query in it, there are.
 using Counts = std::map<int, std::int64_t>;
 
@@ -133,7 +129,7 @@ int info_command(const std::string& path, bool json) {
   Json all = Json::array();
   const int exit_code =
       for_each_map(path, [&](const std::string& one) { show_info(one, json ? &all : nullptr); });
-  if (json) fmt::print("{}\n", dump(addresses_in(path).size() == 1 ? all.front() : all));
+  if (json) print_document(addresses_in(path).size() == 1 ? all.front() : all);
   return exit_code;
 }
 
@@ -171,7 +167,7 @@ int list_command(const std::string& path, bool json) {
   const int exit_code = for_each_map(path, [&](const std::string& one) {
     show_sessions(one, json ? &all : nullptr, has_heading);
   });
-  if (json) fmt::print("{}\n", dump(all));
+  if (json) print_document(all);
   return exit_code;
 }
 
@@ -183,8 +179,8 @@ void merge_command(const std::string& into, const std::vector<std::string>& othe
                counted(counts.loops, "loop"));
     if (counts.continued > 0) {
       fmt::print("; the rest of {}", counted(counts.continued, "session"));
-    };
-    if (counts.known > 0) fmt::print("; {} sessions were already there", counts.known);
+    }
+    if (counts.known > 0) fmt::print("; already there: {}", counted(counts.known, "session"));
     fmt::print("\n");
   }
   tell_unlinked(MapReader(into));
@@ -195,9 +191,7 @@ void move_command(const std::string& from, const std::string& to,
   const MoveCounts counts = move_sessions(from, to, sessions);
   fmt::print("moved      {}, {}", counted(counts.sessions, "session"),
              counted(counts.places, "place"));
-  if (counts.known > 0) {
-    fmt::print("; already there: {}", counted(counts.known, "session"));
-  };
+  if (counts.known > 0) fmt::print("; already there: {}", counted(counts.known, "session"));
   fmt::print("\n");
   tell_unlinked(MapReader(to));
 }

@@ -201,9 +201,7 @@ void print_line(const std::string& image, const Answer& answer) {
   }
   if (answer.pose) json["relative_pose"] = json_of(*answer.pose);
   if (!answer.not_asked.empty()) json["not_asked"] = answer.not_asked;
-  const std::string text =
-      json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-  fmt::print("{}\n", printable_json(text));
+  print_document(json, -1);
 }
 
 /// Asks a map about images, and prints its answers.
@@ -345,7 +343,7 @@ void add_query(CLI::App& app, int& exit_code) {
       ->type_name("DIR");
   command
       ->add_option("--epoch", flags->epoch,
-                   "Answer as of this epoch of a map on a server, as when that was its last commit")
+                   "Answer as of this epoch of a map on a server: without later commits")
       ->type_name("N");
   add_map_cache_flag(*command, flags->map_cache_mb);
   add_image_flag(*command, flags->max_megapixels);

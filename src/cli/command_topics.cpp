@@ -37,9 +37,7 @@ void print_topics_json(const RecordingInfo& info) {
                               {"rate_hz", rate_hz(topic, info)},
                               {"has_images", topic.has_images}});
   }
-  const std::string text =
-      json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-  fmt::print("{}\n", printable_json(text));
+  print_document(json);
 }
 
 void print_topics_table(const RecordingInfo& info) {

@@ -2,11 +2,9 @@
 // SPDX-License-Identifier: MIT
 #include "json_lines.hpp"
 
-#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "loopbit/finished_run.hpp"
-#include "loopbit/printable.hpp"
 
 #include "process.hpp"
 
@@ -16,8 +14,7 @@ namespace {
 using Line = nlohmann::ordered_json;
 
 void print_now(const Line& line) {
-  const std::string text = line.dump(-1, ' ', false, Line::error_handler_t::replace);
-  fmt::print("{}\n", printable_json(text));
+  print_document(line, -1);
   flush_stdout();
 }
 

@@ -33,7 +33,8 @@ namespace cli = loopbit::cli;
 
 constexpr const char* kFooter =
     "Exit codes: 0 success; 1 internal error; 2 invalid option or setting; 3 input missing or "
-    "unreadable; 4 output cannot be written; 130 interrupted, results so far are kept.";
+    "damaged, or a server did not answer; 4 output cannot be written; 130 interrupted, results so "
+    "far are kept.";
 
 /// Column of the text that explains what a line of help begins with, after two or more spaces; the
 /// line's own indent if there is none.

@@ -13,6 +13,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 #include <spawn.h>
 #include <sys/ioctl.h>
 #include <sys/wait.h>
@@ -118,6 +119,12 @@ void flush_stdout() {
   if (std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return;
   // The reason of an earlier failure is not kept.
   throw cannot_write("standard output", errno != 0 ? errno : EIO);
+}
+
+void print_document(const nlohmann::ordered_json& json, int indent) {
+  const std::string text =
+      json.dump(indent, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  fmt::print("{}\n", printable_json(text));
 }
 
 void print_or_write(const std::string& text, const std::string& file) {

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <string>
 
+#include <nlohmann/json_fwd.hpp>
+
 namespace loopbit::cli {
 
 /// Lets no file that is opened later take the place of a closed stdin, stdout or stderr.
@@ -27,6 +29,10 @@ void clear_terminal_line();
 
 /// Throws Error (kind output) if something that was printed did not reach stdout.
 void flush_stdout();
+
+/// Prints `json`, with `indent` spaces per level; -1 = on one line. Bytes that are not UTF-8, as a
+/// path may have, are replaced.
+void print_document(const nlohmann::ordered_json& json, int indent = 2);
 
 /// Writes `text` to `file`, or to stdout if that is empty. Throws Error (kind output).
 void print_or_write(const std::string& text, const std::string& file);

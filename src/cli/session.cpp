@@ -16,6 +16,7 @@
 #include "loopbit/finished_run.hpp"
 #include "loopbit/map_server.hpp"
 #include "loopbit/mcap_export.hpp"
+#include "loopbit/printable.hpp"
 #include "loopbit/run_input.hpp"
 #include "loopbit/write_file.hpp"
 
@@ -90,22 +91,20 @@ RunOutcome run_with_progress(RunInput& input, const SessionFlags& flags, LivePag
 /// Whether the map's server was always there, and has everything.
 void tell_of_server(const RunRecord& record) {
   if (record.map_unverified > 0) {
-    tell(
-        fmt::format("loopbit: A server did not give the features of {} candidates in time; they "
-                    "were left out.\n",
-                    record.map_unverified));
+    tell(fmt::format("loopbit: Left out: {}, whose features a server did not give in time.\n",
+                     counted(record.map_unverified, "candidate")));
   }
   const std::string own = addresses_in(record.map_path).front();
   if (!record.map_queue.empty()) {
-    tell(
-        fmt::format("loopbit: The server of '{0}' lacks {1} frames of session {2}, which are in "
-                    "'{3}'; 'loopbit map merge {0} {3}' brings them there.\n",
-                    own, record.map_queued_frames, record.map_session, record.map_queue));
+    tell(fmt::format(
+        "loopbit: The server of '{0}' lacks {1} of session {2}, queued in '{3}'; "
+        "'loopbit map merge {0} {3}' brings them there.\n",
+        own, counted(record.map_queued_frames, "frame"), record.map_session, record.map_queue));
   } else if (record.map_reconnections > 0) {
     tell(
-        fmt::format("loopbit: The server of '{}' was lost and reached again {} times; all frames "
-                    "are saved.\n",
-                    own, record.map_reconnections));
+        fmt::format("loopbit: The server of '{}' was lost and reached again {}; all frames are "
+                    "saved.\n",
+                    own, counted(record.map_reconnections, "time")));
   }
 }
 
@@ -126,8 +125,8 @@ void SessionFlags::add_to(CLI::App& command) {
   command.add_flag("--overwrite", run.overwrite, "Replace an earlier run in the output folder");
   command
       .add_option("--map", run.map,
-                  "Continue this map, or create it; or continue the one of a PostgreSQL database, "
-                  "postgresql://... Places of earlier sessions are recognised; of several "
+                  "Continue this map file, or create it, or continue the map at a PostgreSQL "
+                  "address, postgresql://... Places of earlier sessions are recognised. Of several "
                   "addresses in quotes, the first one gets the session")
       ->type_name("MAP");
   command.add_flag("--keep-images", run.keep_images, "Store a small JPEG of each place in the map")
@@ -173,8 +172,8 @@ void SessionFlags::add_to(CLI::App& command) {
   command
       .add_option(
           "--live-address", live_address,
-          "Serve it on this address of the machine, to others, at a URL with a secret token; "
-          "0.0.0.0 = all addresses")
+          "Serve the report to other machines, too, on this address and at a URL with a secret "
+          "token; 0.0.0.0 = all addresses")
       ->type_name("ADDRESS")
       ->needs(live);
   add_report_flag(command, report);
@@ -205,8 +204,8 @@ void add_report_flag(CLI::App& command, ReportOptions& options) {
 void add_mask_flag(CLI::App& command, std::string& mask) {
   command
       .add_option("--mask", mask,
-                  "An image of the size of the images, 8 bits: where it is 0 (black), the images "
-                  "are ignored, such as for the robot's own body")
+                  "An 8-bit image as large as the images: where it is 0 (black), the images are "
+                  "ignored, such as over the robot's own body")
       ->type_name("FILE");
 }
 

@@ -80,7 +80,7 @@ void print_revisits(const std::vector<Detection>& detections) {
                span(one.first_match, one.last_match));
   }
   if (groups.size() > kShown) {
-    fmt::print("            and {} shorter revisits\n", groups.size() - kShown);
+    fmt::print("            and {}\n", counted(groups.size() - kShown, "shorter revisit"));
   }
 }
 

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/image_source.hpp"
 
-#include <charconv>
 #include <filesystem>
 #include <string_view>
 #include <system_error>
@@ -12,6 +11,7 @@
 
 #include "loopbit/error.hpp"
 #include "loopbit/image_file.hpp"
+#include "loopbit/text_rows.hpp"
 
 #include "capture.hpp"
 #include "sequence_lists.hpp"
@@ -59,10 +59,8 @@ class ImageListSource final : public ImageSource {
 /// OpenCV reads numbers from 100 on as a choice of backend.
 int camera_number(std::string_view text) {
   constexpr int kMax = 99;
-  int number = -1;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const bool is_number = error == std::errc() && end == text.data() + text.size();
-  if (is_number && number >= 0 && number <= kMax) return number;
+  const auto number = parse_number<int>(text);
+  if (number && *number >= 0 && *number <= kMax) return *number;
   throw Error(ErrorKind::option,
               fmt::format("'{}{}' names no camera: give camera:N with N from 0 to {}, such as "
                           "camera:0.",

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
@@ -26,6 +25,7 @@
 #include "loopbit/error.hpp"
 #include "loopbit/growing_report.hpp"
 #include "loopbit/read_file.hpp"
+#include "loopbit/text_rows.hpp"
 
 namespace loopbit {
 namespace {
@@ -60,13 +60,6 @@ std::string secret() {
   std::string digits;
   for (int i = 0; i < 4; ++i) digits += fmt::format("{:08x}", std::uint32_t{random()});
   return digits;
-}
-
-std::optional<std::size_t> number_in(const std::string& text) {
-  std::size_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const bool is_number = error == std::errc() && end == text.data() + text.size();
-  return is_number ? std::optional(number) : std::nullopt;
 }
 
 /// The name for a URL, which others have to reach.
@@ -190,7 +183,7 @@ class LivePage::Impl {
                                   {"X-Content-Type-Options", "nosniff"}});
     server_->Get(path_, [this](const auto&, auto& response) { show_page(response); });
     server_->Get(path_ + "pictures/(\\d{1,9})", [this](const auto& request, auto& response) {
-      show_picture(*number_in(request.matches[1]), response);
+      show_picture(*parse_number<std::size_t>(request.matches[1].str()), response);
     });
     server_->Get(path_ + "events/(\\w{1,40})", [this](const auto& request, auto& response) {
       feed(request.matches[1], request.get_header_value("Last-Event-ID"), response);
@@ -300,8 +293,8 @@ class LivePage::Impl {
       }
       ++viewers_;
     }
-    auto viewer = std::make_shared<Viewer>(
-        Viewer{.is_of_this_run = run == id_, .next = number_in(last_event).value_or(0)});
+    auto viewer = std::make_shared<Viewer>(Viewer{
+        .is_of_this_run = run == id_, .next = parse_number<std::size_t>(last_event).value_or(0)});
     response.set_chunked_content_provider(
         "text/event-stream",
         [this, viewer](std::size_t /*offset*/, httplib::DataSink& sink) {

@@ -10,7 +10,7 @@
 namespace loopbit {
 namespace {
 
-/// Of a feature nearest to each other on two levels of the pyramid, which are an octave apart.
+/// Nearest features may differ in scale by an octave, from one level of the pyramid to the next.
 constexpr float kMaxScaleRatio = 2.0F;
 constexpr int kNoBin = -1;
 
@@ -27,10 +27,6 @@ int bin_of(const Keypoint& a, const Keypoint& b, float bin_px) {
   const int y = floor_of((a.y_px - b.y_px) / bin_px) + kRows / 2;
   const bool is_in = 0 <= x && x < kRows && 0 <= y && y < kRows;
   return is_in ? Displacements::moved(0, x, y) : kNoBin;
-}
-
-const Keypoint& keypoint_of(const Features& features, int index) {
-  return features.keypoints[static_cast<std::size_t>(index)];
 }
 
 }  // namespace
@@ -79,15 +75,6 @@ void DisplacementVotes::append_nearest(const FirstLook::Group& group, std::size_
   matches_.resize(kept);
 }
 
-const std::vector<Match>& DisplacementVotes::nearest_matches(const Features& query,
-                                                             const Features& place,
-                                                             const FirstLook& look) {
-  matches_.clear();
-  append_nearest(look.dark, 0, 0);
-  append_nearest(look.bright, query.num_dark, place.num_dark);
-  return matches_;
-}
-
 void Neighbourhoods::find(const std::vector<Keypoint>& keypoints,
                           const std::vector<std::int16_t>& indices, float spacing_scales) {
   by_x_.clear();
@@ -107,6 +94,8 @@ void Neighbourhoods::find(const std::vector<Keypoint>& keypoints,
       pairs_.emplace_back(std::max(here->index, there->index), std::min(here->index, there->index));
     }
   }
+  // A counting sort by the later feature. While its group is filled, begins_[later + 1] is the end
+  // of the group so far; in the end begins_[i] is where the group of feature i begins.
   begins_.assign(keypoints.size() + 2, 0);
   for (const auto& [later, earlier] : pairs_) ++begins_[static_cast<std::size_t>(later) + 2];
   std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
@@ -133,7 +122,9 @@ void DisplacementVotes::begin(const Features& query, std::span<const FirstLook> 
 
 Votes DisplacementVotes::count(const Features& query, const Features& place,
                                const FirstLook& look) {
-  nearest_matches(query, place, look);
+  matches_.clear();
+  append_nearest(look.dark, 0, 0);
+  append_nearest(look.bright, query.num_dark, place.num_dark);
   find_moved(query, place);
   bins_.clear();
   for (const Moved& moved : moved_) bins_.push_back(moved.bin);
@@ -152,8 +143,7 @@ void DisplacementVotes::find_moved(const Features& query, const Features& place)
       static_cast<float>(query.working_size_px.width) / Displacements::kBinsPerWidth;
   moved_.clear();
   for (const Match& match : matches_) {
-    const auto bin =
-        bin_of(keypoint_of(query, match.query), keypoint_of(place, match.place), bin_px);
+    const auto bin = bin_of(query.keypoint(match.query), place.keypoint(match.place), bin_px);
     if (bin != kNoBin) moved_.push_back({match.query, bin});
   }
 }

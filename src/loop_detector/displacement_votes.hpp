@@ -95,14 +95,10 @@ class DisplacementVotes {
   /// Begins with a frame. `looks`: those of which count() will be asked.
   void begin(const Features& query, std::span<const FirstLook> looks);
 
-  /// Of the frame that begin() was given. Linear in the features, if they are spread. `look`: of
-  /// match_strongest() for the same pair.
+  /// Of the frame that begin() was given: counts the query's features whose nearest of the place
+  /// has no nearer one in the query, without a ratio test. Linear in the features, if they are
+  /// spread. `look`: of match_strongest() for the same pair.
   Votes count(const Features& query, const Features& place, const FirstLook& look);
-
-  /// What count() counts: the query's features whose nearest of the place has no nearer one in the
-  /// query, without a ratio test. Valid until the next call.
-  const std::vector<Match>& nearest_matches(const Features& query, const Features& place,
-                                            const FirstLook& look);
 
  private:
   /// A feature of the query, and the bin of its displacement.
@@ -121,7 +117,7 @@ class DisplacementVotes {
   Neighbourhoods neighbourhoods_;  ///< of the query
   /// Of the features of a place: the squared distance, then the query's feature in the lower half.
   std::vector<std::uint64_t> nearest_;
-  std::vector<Match> matches_;
+  std::vector<Match> matches_;           ///< what count() counts
   std::vector<std::int16_t> looked_at_;  ///< features of the query
   std::vector<Moved> moved_;
   std::vector<int> counted_bin_;  ///< of each feature of the query, if it counts

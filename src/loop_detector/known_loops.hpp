@@ -39,7 +39,7 @@ class KnownLoops {
     }
   }
 
-  /// The same step if `step` itself was found to be a revisit.
+  /// The step of the first visit, if `step` itself has a loop.
   [[nodiscard]] std::optional<std::ptrdiff_t> first_visit_of(std::ptrdiff_t step) const;
 
  private:

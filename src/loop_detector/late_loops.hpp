@@ -17,7 +17,7 @@ namespace loopbit {
 /// pass of the PlaceFilter's model over the last few steps gives each of their frames the
 /// probability that all frames until now give it.
 ///
-/// Cost and memory have fixed bounds; see kMaxSteps and kMaxFrames in late_loops.cpp.
+/// Cost and memory have fixed bounds; see kWindowSteps and kMaxFrames in late_loops.cpp.
 class LateLoops {
  private:
   struct Step;

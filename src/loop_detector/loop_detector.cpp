@@ -46,8 +46,8 @@ constexpr std::size_t kFollowedPaths = 3;
 constexpr double kMinFollowedProbability = 2e-3;
 /// On each, the places up to so many steps away.
 constexpr std::ptrdiff_t kFollowedReach = 2;
-/// With odometry, so many times as many places are looked up: those of other storeys may look more
-/// alike than the one where the robot is.
+/// With odometry, so many times as many places are looked up, up to kMaxCandidates: those of other
+/// storeys may look more alike than the one where the robot is.
 constexpr int kLookAlikes = 10;
 /// A frame is compared with all its keypoints if the robot is at an earlier place with this
 /// probability, so that most new places cost little.
@@ -68,7 +68,8 @@ void check_whole(const Features& features) {
   const std::size_t size = features.keypoints.size();
   const cv::Size& size_px = features.working_size_px;
   constexpr std::size_t kMost = std::numeric_limits<std::int16_t>::max();
-  const bool has_image = size == 0 || !size_px.empty();
+  const bool has_image =
+      size_px.width >= 0 && size_px.height >= 0 && (size == 0 || !size_px.empty());
   if (features.descriptors.size() == size && features.num_dark <= size && size <= kMost &&
       has_image) {
     return;
@@ -86,15 +87,15 @@ void check_whole(const Features& features) {
 int moved_inliers(const Features& query, const Features& place, const std::vector<Match>& inliers) {
   constexpr float kMinMotion_px = 2.0F;
   return static_cast<int>(std::count_if(inliers.begin(), inliers.end(), [&](const Match& match) {
-    const Keypoint& a = query.keypoints[static_cast<std::size_t>(match.query)];
-    const Keypoint& b = place.keypoints[static_cast<std::size_t>(match.place)];
+    const Keypoint& a = query.keypoint(match.query);
+    const Keypoint& b = place.keypoint(match.place);
     return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px) > kMinMotion_px;
   }));
 }
 
 /// Of a keypoint in its image, 0 to 1.
 cv::Point2f relative_position(const Features& features, int index) {
-  const Keypoint& keypoint = features.keypoints[static_cast<std::size_t>(index)];
+  const Keypoint& keypoint = features.keypoint(index);
   return {keypoint.x_px / static_cast<float>(features.working_size_px.width),
           keypoint.y_px / static_cast<float>(features.working_size_px.height)};
 }
@@ -271,7 +272,7 @@ class LoopDetector::Impl {
     places_.known_loops().take(found);
     if (shortcuts) shortcuts_.commit(std::move(*shortcuts));
     place_filter_.commit(std::move(next));
-    if (frame.empty()) return;
+    if (options_.decision.count_matches) return;
     late_loops_.commit(std::move(frame), seen.look.is_step, seen.changed);
     for (const LateLoops::Loop& loop : seen.changed.withdrawn) {
       places_.known_loops().remove(places_.step_of(loop.frame), loop.matched_step);
@@ -298,16 +299,19 @@ class LoopDetector::Impl {
       excluded_ = {};
       return;
     }
-    if (mask.type() != CV_8UC1 || cv::countNonZero(mask) == 0) {
+    if (mask.type() != CV_8UC1) {
       throw Error(ErrorKind::option,
-                  mask.type() != CV_8UC1
-                      ? fmt::format("The mask is of OpenCV type {}; give one of 8 bits, grey.",
-                                    cv::typeToString(mask.type()))
-                      : "The mask is 0 everywhere, which excludes the whole image; pixels that "
-                        "count are not 0.");
+                  fmt::format("The mask is of OpenCV type {}; give one of 8 bits, grey.",
+                              cv::typeToString(mask.type())));
     }
-    excluded_ = excluded_pixels(mask);
-    mask_ = mask.clone();
+    if (cv::countNonZero(mask) == 0) {
+      throw Error(ErrorKind::option,
+                  "The mask is 0 everywhere, which excludes the whole image; pixels that count are "
+                  "not 0.");
+    }
+    const cv::Mat1b copy = mask.clone();
+    excluded_ = excluded_pixels(copy);
+    mask_ = copy;
   }
 
   /// See LoopDetector::set_camera.
@@ -446,7 +450,8 @@ class LoopDetector::Impl {
   [[nodiscard]] RecentView::Look look(Observation& seen) const {
     const bool is_step = places_.changes_view(seen.content);
     return places_.recent_view().look(places_.size(), is_step, [&](PlaceId place) {
-      if (is_window_fixed()) return true;
+      // A fixed window does not depend on the view, of which only the latest step is needed.
+      if (is_window_fixed()) return false;
       const Verification& shared = compare(seen, place);
       return moved_inliers(seen.features, features(place, seen), shared.inliers) >=
              options_.exclusion.in_view_inliers;
@@ -522,7 +527,9 @@ class LoopDetector::Impl {
   std::vector<Candidate> similar_places(const Detection& detection, PlaceId end,
                                         Observation& seen) const {
     RetrievalOptions retrieval = options_.retrieval;
-    if (detection.odometry) retrieval.max_candidates *= kLookAlikes;
+    if (detection.odometry) {
+      retrieval.max_candidates = std::min(kMaxCandidates, kLookAlikes * retrieval.max_candidates);
+    }
     auto similar = places_.contents().query(seen.content, end, retrieval, seen.is_allowed);
     if (!detection.odometry) return similar;
     keep_in_reach(*detection.odometry, end, seen);

@@ -21,7 +21,7 @@ struct Hypothesis {
 /// A probability for each of a few steps, in their order; the rest is somewhere new.
 struct Belief {
   std::vector<Hypothesis> places;
-  double leave = 0;  ///< predicted with this probability that the path was left
+  double leave = 0;  ///< if predicted: the probability that the robot has just left its path
 
   [[nodiscard]] double elsewhere() const;
   [[nodiscard]] double at(std::ptrdiff_t step) const;

@@ -20,7 +20,7 @@ namespace loopbit {
 
 /// The probability that the robot is back at an earlier place, and at which: a discrete Bayes
 /// filter over the steps of the past (changes of view) and "somewhere new". docs/method.md, section
-/// 4, has the model; every constant stands in place_filter.cpp with its reason.
+/// 4, has the model.
 ///
 /// Emission: what a candidate shows, displacement votes and geometry, as a likelihood ratio of "the
 /// same place" against "another place". Both nulls are measured on this map: votes against what
@@ -61,12 +61,13 @@ class PlaceFilter {
     double revisit = 0;      ///< that any match is right
   };
 
-  /// A tail that was measured: how often, and how far beyond its beginning on average.
+  /// The best wrong place of each frame so far, in inliers beyond chance: how often there are any,
+  /// and `excess` / `count` on average. Frames count as far as the robot was somewhere new.
   struct Tail {
-    double seen;
-    double unseen;
-    double excess;
-    double count;
+    double seen;    ///< frames with any
+    double unseen;  ///< frames with none
+    double excess;  ///< the sum over `count` frames
+    double count;   ///< as `seen`, with a prior of its own
   };
 
   /// Steps so close, or laps through one place, show the same place.
@@ -159,8 +160,11 @@ class PlaceFilter {
   std::unordered_map<std::ptrdiff_t, Shown> shown_;  ///< by step
   WrongPaths votes_;                                 ///< their deviations
   SteadyDisplacements steady_;
-  Tail tail_{1, 10, 10, 10};
-  double same_path_products_ = 100;  ///< of deviations along a path, and their squares
+  /// Prior: one frame in 11 has any, and ten frames had one each.
+  Tail tail_{.seen = 1, .unseen = 10, .excess = 10, .count = 10};
+  /// Sums of the products of successive deviations along paths of wrong places, and of squares.
+  /// Prior: a correlation of 1/2.
+  double same_path_products_ = 100;
   double same_path_squares_ = 200;
 };
 

@@ -16,7 +16,8 @@
 
 namespace loopbit {
 
-/// Loops of a session as shortcuts of odometry: who is back at a place knows the way from there.
+/// Loops of a session as shortcuts of odometry: a robot that is back at a place is where it was
+/// then, however far odometry has drifted since.
 class Shortcuts {
  public:
   struct Loop {

@@ -510,7 +510,7 @@ MergeCounts merge_map(const std::string& into, const std::string& from) {
     source.reset();  // it may read the same map
     to->close();
     return counts;
-  } catch (const Error&) {
+  } catch (...) {
     source.reset();
     to->close();
     throw;
@@ -545,7 +545,7 @@ MapCheck recover_map(const std::string& from, const std::string& to) {
                                               "loopbit's, or no session in it is whole; use a "
                                               "copy from before.",
                                               without_secrets(from)));
-  } catch (const Error&) {
+  } catch (...) {
     remove_database(part);
     throw;
   }
@@ -567,7 +567,7 @@ CompactCounts compact_map(const std::string& path, const CompactOptions& options
     if (!error) counts.bytes_after = fs::file_size(part, error);
     if (!error) fs::rename(part, file, error);
     if (error) throw cannot_write(path, error.value());
-  } catch (const Error&) {
+  } catch (...) {
     remove_database(part);
     throw;
   }

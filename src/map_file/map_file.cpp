@@ -410,9 +410,7 @@ class MapWriter::Impl {
     for (SessionFrame* at : {&query, &match}) {
       if (at->session == 0) at->session = session_;
       if (at->session == session_ || earlier_->sessions().contains(at->session)) continue;
-      throw Error(ErrorKind::option, fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' "
-                                                 "shows those there are.",
-                                                 path_, at->session));
+      throw unknown_session(path_, at->session);
     }
     const SessionUpload::Change rejection = [query, match](const MapDatabase& database) {
       reject_loop(database, query, match);

@@ -10,6 +10,7 @@
 #include <limits>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include <fmt/format.h>
 #include <libdeflate.h>
@@ -66,6 +67,7 @@ class Checksum {
   Checksum& add(double value);
   Checksum& add(std::span<const unsigned char> bytes);
   Checksum& add(std::string_view text);
+  Checksum& add(const SessionFrame& at);
 
   [[nodiscard]] std::int64_t value() const { return value_; }
 
@@ -90,6 +92,10 @@ Checksum& Checksum::add(std::int64_t value) {
 Checksum& Checksum::add(double value) {
   const double stored = value + 0.0;  // SQLite keeps -0.0 as 0.0
   return add(std::bit_cast<std::array<unsigned char, sizeof stored>>(stored));
+}
+
+Checksum& Checksum::add(const SessionFrame& at) {
+  return add(std::int64_t{at.session}).add(std::int64_t{at.frame});
 }
 
 /// 16 bytes, plus 80 bytes per feature.
@@ -231,59 +237,42 @@ Checksum checksum_of(const MapSession& s) {
       .add(std::string_view(s.options));
 }
 
-Checksum checksum_of(const SessionFrame& at) {
-  return Checksum().add(std::int64_t{at.session}).add(std::int64_t{at.frame});
-}
-
 Checksum checksum_of(const MapPlace& place) {
-  return checksum_of(place.at)
+  return Checksum()
+      .add(place.at)
       .add(place.timestamp_s.value_or(0.0))
       .add(content_bytes(place.content));
 }
 
 /// The order differs from that of features, so that features never pass for an image.
 Checksum checksum_of_image(std::span<const unsigned char> jpeg, const SessionFrame& at) {
-  return Checksum().add(jpeg).add(std::int64_t{at.session}).add(std::int64_t{at.frame});
+  return Checksum().add(jpeg).add(at);
 }
 
 Checksum checksum_of(const MapLoop& loop) {
-  return checksum_of(loop.query)
-      .add(std::int64_t{loop.match.session})
-      .add(std::int64_t{loop.match.frame})
+  return Checksum()
+      .add(loop.query)
+      .add(loop.match)
       .add(loop.score)
       .add(loop.similarity)
       .add(std::int64_t{loop.matches})
       .add(std::int64_t{loop.inliers});
 }
 
-/// The order differs from that of loops, so that neither passes for the other.
+/// The match comes before the query, so that neither passes for the other.
 Checksum checksum_of_rejected(const MapLoop& loop) {
-  return checksum_of(loop.match)
-      .add(std::int64_t{loop.query.session})
-      .add(std::int64_t{loop.query.frame})
-      .add(loop.score)
-      .add(loop.similarity)
-      .add(std::int64_t{loop.matches})
-      .add(std::int64_t{loop.inliers});
+  MapLoop swapped = loop;
+  std::swap(swapped.query, swapped.match);
+  return checksum_of(swapped);
 }
 
 /// As of images, the order tells it from a place.
 Checksum checksum_of(const MapOdometry& odometry, std::span<const unsigned char> pose) {
-  return Checksum()
-      .add(pose)
-      .add(std::int64_t{odometry.at.session})
-      .add(std::int64_t{odometry.at.frame})
-      .add(odometry.timestamp_s.value_or(0.0));
+  return Checksum().add(pose).add(odometry.at).add(odometry.timestamp_s.value_or(0.0));
 }
 
 Checksum checksum_of(const MapLoopPose& pose, std::span<const unsigned char> bytes) {
-  return Checksum()
-      .add(bytes)
-      .add(std::int64_t{pose.query.session})
-      .add(std::int64_t{pose.query.frame})
-      .add(std::int64_t{pose.match.session})
-      .add(std::int64_t{pose.match.frame})
-      .add(to_string(pose.measured.known));
+  return Checksum().add(bytes).add(pose.query).add(pose.match).add(to_string(pose.measured.known));
 }
 
 Checksum checksum_of_linked(int session) { return Checksum().add(std::int64_t{session}); }
@@ -295,6 +284,12 @@ int narrow(std::int64_t value) {
 
 SessionFrame session_frame(const SqlStatement& row, int column) {
   return {narrow(row.integer(column)), narrow(row.integer(column + 1))};
+}
+
+/// To two parameters, from `parameter` on.
+void bind_frame(SqlStatement& row, int parameter, const SessionFrame& at) {
+  row.bind(parameter, std::int64_t{at.session});
+  row.bind(parameter + 1, std::int64_t{at.frame});
 }
 
 /// The columns of `loop` or `rejected` that loop_in() reads.
@@ -374,10 +369,8 @@ std::string insertion_of_loop(const std::string& table) {
 }
 
 void write_loop(SqlStatement& row, const MapLoop& loop, const Checksum& checksum) {
-  row.bind(1, std::int64_t{loop.query.session});
-  row.bind(2, std::int64_t{loop.query.frame});
-  row.bind(3, std::int64_t{loop.match.session});
-  row.bind(4, std::int64_t{loop.match.frame});
+  bind_frame(row, 1, loop.query);
+  bind_frame(row, 3, loop.match);
   row.bind(5, loop.score);
   row.bind(6, loop.similarity);
   row.bind(7, std::int64_t{loop.matches});
@@ -427,6 +420,12 @@ void refuse_damaged(const std::string& path, const std::vector<std::string>& cla
       fmt::format("'{0}' is damaged ({1}{2}), and is left as it is; 'loopbit map check {0} "
                   "--recover NEW.db' saves the rest in a new map.",
                   path, clauses.front(), more > 0 ? fmt::format(", and {} more", more) : ""));
+}
+
+Error unknown_session(const std::string& path, int session) {
+  return {ErrorKind::option,
+          fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' shows those there are.",
+                      path, session)};
 }
 
 std::vector<MapSession> read_sessions(const MapDatabase& database, Damage& damage,
@@ -600,7 +599,7 @@ namespace {
 std::optional<Features> checked_features(const SqlStatement& row, int column,
                                          const SessionFrame& at) {
   const auto bytes = row.bytes(column);
-  if (!has_checksum(row, column + 1, checksum_of(at).add(bytes))) return std::nullopt;
+  if (!has_checksum(row, column + 1, Checksum().add(at).add(bytes))) return std::nullopt;
   return features_from(bytes);
 }
 
@@ -708,8 +707,7 @@ void RowWriter::write(const MapSession& session) {
 
 void RowWriter::write(const MapPlace& place, const Features& features) {
   place_->bind(1, place.id);
-  place_->bind(2, std::int64_t{place.at.session});
-  place_->bind(3, std::int64_t{place.at.frame});
+  bind_frame(*place_, 2, place.at);
   place.timestamp_s ? place_->bind(4, *place.timestamp_s) : place_->bind_null(4);
   place_->bind(5, content_bytes(place.content));
   place_->bind(6, checksum_of(place).value());
@@ -717,7 +715,7 @@ void RowWriter::write(const MapPlace& place, const Features& features) {
   const std::vector<unsigned char> bytes = features_bytes(features);
   features_->bind(1, place.id);
   features_->bind(2, bytes);
-  features_->bind(3, checksum_of(place.at).add(bytes).value());
+  features_->bind(3, Checksum().add(place.at).add(bytes).value());
   features_->run();
 }
 
@@ -738,8 +736,7 @@ void RowWriter::write_rejected(const MapLoop& loop) {
 void RowWriter::write(const MapOdometry& odometry) {
   const PoseNumbers numbers =
       pose_numbers(odometry.pose.T_odometry_camera, odometry.pose.covariance.value());
-  odometry_->bind(1, std::int64_t{odometry.at.session});
-  odometry_->bind(2, std::int64_t{odometry.at.frame});
+  bind_frame(*odometry_, 1, odometry.at);
   odometry.timestamp_s ? odometry_->bind(3, *odometry.timestamp_s) : odometry_->bind_null(3);
   odometry_->bind(4, bytes_of(numbers));
   odometry_->bind(5, checksum_of(odometry, bytes_of(numbers)).value());
@@ -749,10 +746,8 @@ void RowWriter::write(const MapOdometry& odometry) {
 void RowWriter::write(const MapLoopPose& pose) {
   const Motion& motion = pose.measured.motion;
   const PoseNumbers numbers = pose_numbers(motion.T_from_to, motion.covariance);
-  relative_pose_->bind(1, std::int64_t{pose.query.session});
-  relative_pose_->bind(2, std::int64_t{pose.query.frame});
-  relative_pose_->bind(3, std::int64_t{pose.match.session});
-  relative_pose_->bind(4, std::int64_t{pose.match.frame});
+  bind_frame(*relative_pose_, 1, pose.query);
+  bind_frame(*relative_pose_, 3, pose.match);
   relative_pose_->bind(5, to_string(pose.measured.known));
   relative_pose_->bind(6, bytes_of(numbers));
   relative_pose_->bind(7, checksum_of(pose, bytes_of(numbers)).value());
@@ -790,11 +785,8 @@ void reject_loop(const MapDatabase& database, MapLoop loop) {
   const auto of_pair = [&](const std::string& what) {
     auto statement = database.prepare(
         what + " WHERE session = ?1 AND frame = ?2 AND match_session = ?3 AND match_frame = ?4");
-    int parameter = 0;
-    for (const int value :
-         {loop.query.session, loop.query.frame, loop.match.session, loop.match.frame}) {
-      statement->bind(++parameter, std::int64_t{value});
-    }
+    bind_frame(*statement, 1, loop.query);
+    bind_frame(*statement, 3, loop.match);
     return statement;
   };
   if (!of_pair("SELECT rejected FROM rejected")->step()) {

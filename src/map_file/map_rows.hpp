@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "loopbit/binary_content.hpp"
+#include "loopbit/error.hpp"
 #include "loopbit/map_database.hpp"
 #include "loopbit/map_file.hpp"
 
@@ -51,6 +52,9 @@ bool read_content(std::span<const unsigned char> bytes, BinaryContent& content);
 
 /// Throws Error (kind input) if there are `clauses`: a damaged map is neither continued nor copied.
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);
+
+/// The Error (kind option) for a session that the map at `path` does not have.
+Error unknown_session(const std::string& path, int session);
 
 /// The keys of a session's places on a server.
 KeyRange places_of(const MapDatabase& database, int session);

@@ -127,7 +127,7 @@ class SessionMove {
     const Sessions there = sessions_in(*target_);
     const MapSession* const moved = find(here, session);
     if (!moved) {
-      if (!find(there, session)) throw unknown(session);
+      if (!find(there, session)) throw unknown_session(source_->path(), session);
       ++counts.known;
       return;
     }
@@ -172,12 +172,6 @@ class SessionMove {
                       "give the address of another map, or wait until the run has ended.",
                       session, target_->path(), source_->path()));
     }
-  }
-
-  [[nodiscard]] Error unknown(int session) const {
-    return {ErrorKind::option,
-            fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' shows those there are.",
-                        source_->path(), session)};
   }
 
   [[nodiscard]] Error changed(int session) const {
@@ -298,11 +292,7 @@ std::vector<MapSession> sessions_but(const MapReader& map, const std::vector<int
   for (const int number : std::set<int>(dropped.begin(), dropped.end())) {
     const auto removed = std::erase_if(
         sessions, [&](const MapSession& session) { return session.session == number; });
-    if (removed == 0) {
-      throw Error(ErrorKind::option, fmt::format("'{0}' has no session {1}; 'loopbit map list {0}' "
-                                                 "shows those there are.",
-                                                 map.path(), number));
-    }
+    if (removed == 0) throw unknown_session(map.path(), number);
   }
   return sessions;
 }

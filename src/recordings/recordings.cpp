@@ -168,7 +168,7 @@ const Topic& choose_topic(const Recording& recording, const std::string& name) {
     }
     if (std::ranges::count_if(info.topics, has_images) == 1) return *first;
     throw_bad_topic(ErrorKind::option, input,
-                    fmt::format("has several topics with images; choose one as topic: {}",
+                    fmt::format("has several topics with images; choose one: {}",
                                 list(info.topics, has_images)));
   }
   const auto topic = std::ranges::find(info.topics, name, &Topic::name);
@@ -365,14 +365,13 @@ std::unique_ptr<ImageSource> open_recording(const std::string& input, const std:
 std::unique_ptr<ImageSource> open_input(const std::string& input, const std::string& topic,
                                         int max_megapixels, const std::string& odometry_topic) {
   if (is_recording(input)) return open_recording(input, topic, max_megapixels, odometry_topic);
-  for (const auto& [name, value] :
-       {std::pair("topic", topic), std::pair("odometry_topic", odometry_topic)}) {
-    if (value.empty()) continue;
+  for (const std::string& name : {topic, odometry_topic}) {
+    if (name.empty()) continue;
     throw Error(
         ErrorKind::option,
-        fmt::format("{} is '{}', but '{}' is no recording; leave {} out, or give a file .bag, .db3 "
-                    "or .mcap, or the folder of a ROS 2 bag.",
-                    name, value, input, name));
+        fmt::format("'{}' is no recording, so it has no topic '{}'; leave the topic out, or give a "
+                    "file .bag, .db3 or .mcap, or the folder of a ROS 2 bag.",
+                    input, name));
   }
   return open_source(input, max_megapixels);
 }

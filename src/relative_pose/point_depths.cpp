@@ -45,7 +45,7 @@ RigidPose rigid_pose(const cv::Matx44d& transform) {
 
 /// The depth at a keypoint, and 0 where it is not known or where there is an edge.
 double depth_at(const cv::Mat1f& depth_m, const PoseView& match, int keypoint) {
-  const Keypoint& at = match.features->keypoints[static_cast<std::size_t>(keypoint)];
+  const Keypoint& at = match.features->keypoint(keypoint);
   const cv::Size working = match.features->working_size_px;
   const int x =
       static_cast<int>((static_cast<double>(at.x_px) + 0.5) * depth_m.cols / working.width);

@@ -10,7 +10,7 @@ double keypoint_sigma_px(const Keypoint& keypoint) {
 }
 
 std::optional<Ray> ray_of(const PoseView& view, int keypoint) {
-  const Keypoint& at = view.features->keypoints[static_cast<std::size_t>(keypoint)];
+  const Keypoint& at = view.features->keypoint(keypoint);
   const cv::Size working = view.features->working_size_px;
   // A camera without a size is one of images that were not resized.
   const cv::Size size = view.camera->size_px.empty() ? working : view.camera->size_px;

@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
+#include <concepts>
 #include <filesystem>
 #include <string_view>
-#include <type_traits>
 
 #include <fmt/format.h>
 #include <opencv2/core/quaternion.hpp>
@@ -16,6 +15,7 @@
 #include "loopbit/camera_file.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/read_file.hpp"
+#include "loopbit/text_rows.hpp"
 
 #include "run_files.hpp"
 #include "run_folder.hpp"
@@ -48,15 +48,12 @@ class Row {
   /// `text`: a part of the column's cell.
   template <typename T>
   [[nodiscard]] T number_in(std::string_view text, std::size_t column) const {
-    T value{};
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size()) fail(column);
-    if constexpr (std::is_floating_point_v<T>) {
-      if (!std::isfinite(value)) fail(column);
-    } else if constexpr (std::is_signed_v<T>) {
-      if (value < 0) fail(column);
+    const auto value = parse_number<T>(text);
+    if (!value) fail(column);
+    if constexpr (std::signed_integral<T>) {
+      if (*value < 0) fail(column);
     }
-    return value;
+    return *value;
   }
 
   template <typename T>
@@ -107,11 +104,12 @@ void for_each_row(const std::string& path, std::string_view header, const Visit&
   }
 }
 
-Status status_from(const Row& row, std::size_t column) {
+/// The enumerator that a cell names.
+template <typename Enum, std::size_t kSize>
+Enum named(const Row& row, std::size_t column, const std::array<Enum, kSize>& all) {
   const auto* const found =
-      std::find_if(kAllStatuses.begin(), kAllStatuses.end(),
-                   [&](Status status) { return to_string(status) == row.cell(column); });
-  if (found == kAllStatuses.end()) row.fail(column);
+      std::ranges::find_if(all, [&](Enum each) { return to_string(each) == row.cell(column); });
+  if (found == all.end()) row.fail(column);
   return *found;
 }
 
@@ -143,7 +141,7 @@ Detection detection_from(const Row& row) {
   row.check_columns(kColumns);
   Detection detection{.frame = row.number<PlaceId>(0),
                       .timestamp_s = row.number_if_any<double>(1),
-                      .status = status_from(row, 2),
+                      .status = named(row, 2, kAllStatuses),
                       .score = row.number<double>(4),
                       .terms = terms_from(row, 8),
                       .similarity = row.number<double>(5),
@@ -191,15 +189,6 @@ std::vector<std::optional<cv::Vec3d>> read_positions(const std::string& path, st
   return positions;
 }
 
-/// The enumerator that a cell names.
-template <typename Enum, std::size_t kSize>
-Enum named(const Row& row, std::size_t column, const std::array<Enum, kSize>& all) {
-  const auto* const found =
-      std::ranges::find_if(all, [&](Enum each) { return to_string(each) == row.cell(column); });
-  if (found == all.end()) row.fail(column);
-  return *found;
-}
-
 /// Columns as poses_header() has them.
 LoopPose loop_pose_from(const Row& row) {
   constexpr std::size_t kColumns = 16 + 21;
@@ -217,6 +206,8 @@ LoopPose loop_pose_from(const Row& row) {
   pose.rms_px = row.number<double>(15);
   const cv::Quatd turn(row.number<double>(11), row.number<double>(8), row.number<double>(9),
                        row.number<double>(10));
+  constexpr double kMaxRounding = 0.01;
+  if (std::abs(turn.norm() - 1) > kMaxRounding) row.fail(8);  // OpenCV throws at 0
   const cv::Matx33d rotation = turn.toRotMat3x3();
   std::size_t column = 16;
   for (int i = 0; i < 6; ++i) {

@@ -158,8 +158,8 @@ LengthSources lengths_of(const RunRequest& request, const std::optional<CameraMo
   if (asked.empty()) return lengths;
   if (!camera) {
     throw Error(ErrorKind::option,
-                fmt::format("The {} images of '{}' need the calibration of the camera; give "
-                            "camera, or leave them out.",
+                fmt::format("The {} images of '{}' need the calibration of the camera; give it, "
+                            "or leave them out.",
                             request.depth.empty() ? "right" : "depth", asked));
   }
   if (!request.depth.empty() && !request.right.empty()) {

@@ -60,6 +60,15 @@ bool stronger(const Maximum& a, const Maximum& b) {
          std::tuple(-b.response, b.octave, b.y, b.x, b.interval);
 }
 
+/// Keeps the first `most` items in the order of `is_before`, themselves in any order.
+template <typename Item, typename IsBefore>
+void keep_first(std::vector<Item>& items, std::size_t most, const IsBefore& is_before) {
+  if (items.size() <= most) return;
+  std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(most), items.end(),
+                   is_before);
+  items.resize(most);
+}
+
 void check_mask(const cv::Mat1b& mask, cv::Size size_px) {
   if (mask.empty() || mask.size() == size_px) return;
   throw Error(ErrorKind::input,
@@ -187,11 +196,7 @@ class SurfExtractor::Impl {
     for (const Maximum& m : maxima_) cells_[cell_of(m)].push_back(m);
     maxima_.clear();
     for (auto& cell : cells_) {
-      if (cell.size() > limit) {
-        std::nth_element(cell.begin(), cell.begin() + static_cast<std::ptrdiff_t>(limit),
-                         cell.end(), stronger);
-        cell.resize(limit);
-      }
+      keep_first(cell, limit, stronger);
       maxima_.insert(maxima_.end(), cell.begin(), cell.end());
     }
   }
@@ -226,12 +231,7 @@ class SurfExtractor::Impl {
     const auto by_strength = [](const Blob& a, const Blob& b) {
       return stronger(a.maximum, b.maximum);
     };
-    const auto budget = static_cast<std::size_t>(options_.max_keypoints);
-    if (blobs_.size() > budget) {
-      std::nth_element(blobs_.begin(), blobs_.begin() + static_cast<std::ptrdiff_t>(budget),
-                       blobs_.end(), by_strength);
-      blobs_.resize(budget);
-    }
+    keep_first(blobs_, static_cast<std::size_t>(options_.max_keypoints), by_strength);
     for (Blob& blob : blobs_) blob.bright = pyramid_.is_bright(blob.maximum);
     std::sort(blobs_.begin(), blobs_.end(), [&](const Blob& a, const Blob& b) {
       return a.bright != b.bright ? b.bright : by_strength(a, b);

@@ -10,7 +10,7 @@
 
 namespace loopbit {
 
-/// What one 8-bit descriptor value counts: a unit-length descriptor has the length 254.
+/// The 8-bit value that stands for 1 in a unit-length descriptor; 127 stands for 0.5 and more.
 inline constexpr float kDescriptorScale = 254.0F;
 /// A descriptor is made of 20 x 20 samples, each of which spans 2 x 2 of 21 x 21 cells.
 inline constexpr std::size_t kSamples = 20;

@@ -44,7 +44,6 @@ FourSums running(FourSums four) {
   return four + __builtin_shufflevector(kZeros, four, 0, 1, 4, 5);
 }
 
-/// Row `y` of the integral image from `pixels` and the running sums of each column.
 void integral_row(const std::uint8_t* __restrict pixels, std::size_t width,
                   std::uint32_t* __restrict column_sums, std::uint32_t* __restrict even,
                   std::uint32_t* __restrict odd) {

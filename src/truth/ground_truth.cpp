@@ -120,7 +120,7 @@ GroundTruth every_nth(const GroundTruth& truth, int every) {
           .near_place = thinned(truth.near_place, every),
           .ignored = thinned(truth.ignored, every),
           .unknown = thinned(truth.unknown, every),
-          .frames = (truth.frames + every - 1) / every};
+          .frames = truth.frames / every + (truth.frames % every != 0 ? 1 : 0)};
 }
 
 void write_place_runs(const std::string& path, const std::string& comment,

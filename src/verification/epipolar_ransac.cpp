@@ -12,6 +12,7 @@
 namespace loopbit {
 namespace {
 
+/// So many samples suffice for kConfidence where 55 % of the pairs are inliers.
 constexpr int kMaxSamples = 500;
 constexpr double kConfidence = 0.999;
 constexpr int kRefits = 6;

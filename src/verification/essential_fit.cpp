@@ -149,8 +149,8 @@ ViewMotion find_motion(std::span<const ViewRayPair> pairs, const cv::Matx33d& mo
   return best;
 }
 
-double refine_motion(std::span<const ViewRayPair> pairs, double huber_px, ViewMotion& motion) {
-  return descend(pairs, kLastSteps, huber_px, motion);
+void refine_motion(std::span<const ViewRayPair> pairs, double huber_px, ViewMotion& motion) {
+  descend(pairs, kLastSteps, huber_px, motion);
 }
 
 }  // namespace loopbit

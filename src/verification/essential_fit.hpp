@@ -34,7 +34,7 @@ struct ViewMotion {
 ViewMotion find_motion(std::span<const ViewRayPair> pairs, const cv::Matx33d& model,
                        double huber_px);
 
-/// Refines `motion` by Levenberg and Marquardt's method; the cost at the end.
-double refine_motion(std::span<const ViewRayPair> pairs, double huber_px, ViewMotion& motion);
+/// Refines `motion` by Levenberg and Marquardt's method, with the same cost.
+void refine_motion(std::span<const ViewRayPair> pairs, double huber_px, ViewMotion& motion);
 
 }  // namespace loopbit

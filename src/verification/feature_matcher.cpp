@@ -183,11 +183,6 @@ void FeatureMatcher::match_rest(Descriptors query, Descriptors place, double max
 }
 
 void FeatureMatcher::match(const Features& query, const Features& place, double max_ratio,
-                           std::vector<Match>& matches) {
-  match(query, place, max_ratio, FirstLook{}, matches);
-}
-
-void FeatureMatcher::match(const Features& query, const Features& place, double max_ratio,
                            const FirstLook& look, std::vector<Match>& matches) {
   if (is_complete(look, query, place)) {
     matches = look.matches;

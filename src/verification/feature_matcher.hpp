@@ -14,22 +14,19 @@
 
 namespace loopbit {
 
-/// match_features() with memory that is kept from pair to pair.
+/// Matches pairs of images; keeps its memory from pair to pair.
 class FeatureMatcher {
  public:
   explicit FeatureMatcher(InstructionSet instruction_set)
       : kernels_(kernels_for<MatchKernels>(instruction_set)) {}
 
-  void match(const Features& query, const Features& place, double max_ratio,
+  /// As match_features(). `look`: of match_strongest() for the same pair, or empty.
+  void match(const Features& query, const Features& place, double max_ratio, const FirstLook& look,
              std::vector<Match>& matches);
 
   /// Of `query` and `place`, so many of the strongest features take part at most.
   void match_strongest(const Features& query, const Features& place, double max_ratio,
                        std::size_t strongest, FirstLook& look);
-
-  /// As match(), after a first look at the same pair.
-  void match(const Features& query, const Features& place, double max_ratio, const FirstLook& look,
-             std::vector<Match>& matches);
 
   /// Of the matches of all features, those of the query's features `asked`, in rising order.
   void match_some(const Features& query, std::span<const int> asked, const Features& place,
@@ -56,7 +53,7 @@ class FeatureMatcher {
   const MatchKernels& kernels_;
   std::vector<std::int32_t> constants_;
   std::vector<int> asked_;      ///< of one group, numbered from its first descriptors
-  std::vector<Match> matches_;  ///< so, too
+  std::vector<Match> matches_;  ///< of one group, numbered likewise
 };
 
 }  // namespace loopbit

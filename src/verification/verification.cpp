@@ -22,13 +22,9 @@ bool has_rays(const Features& query, const Features& place, const CameraModel* c
   return camera != nullptr && query.working_size_px == place.working_size_px;
 }
 
-const Keypoint& keypoint(const Features& features, int index) {
-  return features.keypoints[static_cast<std::size_t>(index)];
-}
-
 EpipolarRansac::Pair pair_of(const Features& query, const Features& place, const Match& match) {
-  const Keypoint& a = keypoint(query, match.query);
-  const Keypoint& b = keypoint(place, match.place);
+  const Keypoint& a = query.keypoint(match.query);
+  const Keypoint& b = place.keypoint(match.place);
   return {a.x_px, a.y_px, b.x_px, b.y_px};
 }
 
@@ -99,8 +95,8 @@ class Geometry {
   int count_distinct(const Features& query, const Features& place, std::span<const Match> inliers,
                      double min_spacing_scales) {
     const auto repeats = [&](const Match& a, const Match& b) {
-      return overlap(keypoint(query, a.query), keypoint(query, b.query), min_spacing_scales) ||
-             overlap(keypoint(place, a.place), keypoint(place, b.place), min_spacing_scales);
+      return overlap(query.keypoint(a.query), query.keypoint(b.query), min_spacing_scales) ||
+             overlap(place.keypoint(a.place), place.keypoint(b.place), min_spacing_scales);
     };
     distinct_.clear();
     for (const Match& match : inliers) {
@@ -116,8 +112,8 @@ class Geometry {
     x_px_.clear();
     y_px_.clear();
     for (const Match& match : inliers) {
-      x_px_.push_back(keypoint(query, match.query).x_px);
-      y_px_.push_back(keypoint(query, match.query).y_px);
+      x_px_.push_back(query.keypoint(match.query).x_px);
+      y_px_.push_back(query.keypoint(match.query).y_px);
     }
     const Range x = middle(x_px_);
     const Range y = middle(y_px_);
@@ -126,7 +122,7 @@ class Geometry {
     };
     const auto features = std::count_if(query.keypoints.begin(), query.keypoints.end(), is_amid);
     const auto explained = std::count_if(inliers.begin(), inliers.end(), [&](const Match& match) {
-      return is_amid(keypoint(query, match.query));
+      return is_amid(query.keypoint(match.query));
     });
     return features == 0 ? 0 : static_cast<double>(explained) / static_cast<double>(features);
   }
@@ -138,8 +134,8 @@ class Geometry {
     const CameraModel camera = resized(calibrated, query.working_size_px);
     rays_.clear();
     for (const Match& match : matches) {
-      rays_.push_back({ray_of(camera, keypoint(query, match.query)),
-                       ray_of(camera, keypoint(place, match.place))});
+      rays_.push_back({ray_of(camera, query.keypoint(match.query)),
+                       ray_of(camera, place.keypoint(match.place))});
     }
     return rays_;
   }
@@ -159,11 +155,6 @@ class Verifier::Impl {
   Impl(const VerificationOptions& options, InstructionSet instruction_set)
       : options_(options), matcher_(instruction_set), geometry_(instruction_set) {
     validate(options, "verification");
-  }
-
-  void match(const Features& query, const Features& place, Verification& result) {
-    matcher_.match(query, place, options_.max_ratio, result.matches);
-    clear_geometry(result);
   }
 
   void match_strongest(const Features& query, const Features& place, std::size_t strongest,
@@ -213,7 +204,7 @@ Verifier::Verifier(Verifier&&) noexcept = default;
 Verifier& Verifier::operator=(Verifier&&) noexcept = default;
 
 void Verifier::match(const Features& query, const Features& place, Verification& result) {
-  impl_->match(query, place, result);
+  impl_->match(query, place, FirstLook{}, result);
 }
 
 void Verifier::match_strongest(const Features& query, const Features& place, std::size_t strongest,
@@ -238,7 +229,7 @@ void Verifier::find_geometry(const Features& query, const Features& place, Verif
 
 std::vector<Match> match_features(const Features& query, const Features& place, double max_ratio) {
   std::vector<Match> matches;
-  FeatureMatcher(active_instruction_set()).match(query, place, max_ratio, matches);
+  FeatureMatcher(active_instruction_set()).match(query, place, max_ratio, FirstLook{}, matches);
   return matches;
 }
 

@@ -137,7 +137,7 @@ def test_a_run_without_a_readable_frame_is_refused(tmp_path, dataset):
     with pytest.raises(loopbit.InputError, match="No frame of .*bad"):
         loopbit.run_folder(bad, tmp_path / "run", on_bad_frame=told.append)
     assert len(told) == 1 and "0.png" in told[0]
-    assert "None of" in json.loads((tmp_path / "run" / "run.json").read_text())["stopped_by"]
+    assert "No frame of" in json.loads((tmp_path / "run" / "run.json").read_text())["stopped_by"]
     run = loopbit.run_folder(good, tmp_path / "run", overwrite=True, on_bad_frame=told.append)
     assert [d.status.name for d in run.detections] == ["unreadable", "no_earlier_place"]
     before = decisions(run.path)

@@ -197,7 +197,7 @@ def test_errors_say_what_is_missing(town, poses, tmp_path):
             loopbit.open_source(recording, odometry_topic=topic)
         for part in [str(recording), *parts]:
             assert part in str(error.value), name
-    with pytest.raises(loopbit.OptionError, match="odometry_topic is '/odom'.* is no recording"):
+    with pytest.raises(loopbit.OptionError, match="is no recording, so it has no topic '/odom'"):
         loopbit.open_source(town / "images", odometry_topic="/odom")
     both = loopbit_command("run", tmp_path / "no_tf.mcap", "--odometry-topic", "/odom", "--odometry",
                            town / "poses.txt", code=2)

@@ -43,8 +43,8 @@ class ImageSource {
   /// One line that describes the source, such as "KITTI odometry sequence, image_0".
   [[nodiscard]] virtual std::string description() const = 0;
 
-  /// When the end was reached: one sentence if the input ends before its time, such as a video that
-  /// is cut off. Empty if it does not, before the end, and where nothing tells.
+  /// After the end: one sentence if the input is known to end too early, such as a video that is
+  /// cut off. Otherwise, and before the end, empty.
   [[nodiscard]] virtual std::string early_end() const { return {}; }
 };
 
@@ -59,7 +59,7 @@ inline constexpr int kMaxMegapixels = 100;
 ///  - a folder with `rgb.txt`: TUM RGB-D;
 ///  - any other folder: its images in natural order (2.png before 10.png), told by extension;
 ///    hidden files and sub-folders are passed over;
-///  - a .txt or .csv file: a list, one image a line, relative to the file or to a folder `images`
+///  - a .txt or .csv file: a list, one image per line, relative to the file or to a folder `images`
 ///    beside it, `#` for comments; or names that NUL bytes end, as `find -print0` writes them;
 ///  - an image file: that one image;
 ///  - any other file: a video, its times counted from its first frame.
@@ -76,7 +76,7 @@ struct Sampling {
   int limit = 0;  ///< at most this many; 0 = all
 };
 
-/// The frames of `source` that `sampling` leaves. Others are skipped, not decoded. Throws Error
+/// The frames of `source` that `sampling` keeps. Others are skipped, not decoded. Throws Error
 /// (kind option) if `every` is less than 1 or `limit` less than 0.
 std::unique_ptr<ImageSource> subsample(std::unique_ptr<ImageSource> source,
                                        const Sampling& sampling);

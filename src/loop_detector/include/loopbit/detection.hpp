@@ -49,7 +49,7 @@ struct ScoreTerms {
   double geometry = 0;  ///< distinct inliers, against those of wrong places
   double path = 0;      ///< the frames before, and the steps beside the match in this frame
   double rivals = 0;    ///< places elsewhere that share the evidence; never above 0
-  double prior = 0;     ///< that a robot returns to this place of all; never above 0
+  double prior = 0;     ///< that a robot returns to this very place; never above 0
 
   [[nodiscard]] double sum() const { return votes + geometry + path + rivals + prior; }
 };
@@ -81,20 +81,20 @@ struct Detection {
   std::optional<SessionFrame> earlier_match =
       std::nullopt;  ///< the same, if it belongs to an earlier session of the map
   double score = 0;  ///< what was compared with decision.min_score
-  std::optional<ScoreTerms> terms =
-      std::nullopt;       ///< of the score; none without a match or with decision.count_matches
-  double similarity = 0;  ///< xi of query and match
-  int matches = 0;        ///< one-to-one feature matches between query and match
-  int inliers = 0;        ///< matches that fit one epipolar geometry
+  std::optional<ScoreTerms> terms = std::nullopt;  ///< of the score; none without a match, if
+                                                   ///< unreachable, or with decision.count_matches
+  double similarity = 0;                           ///< xi of query and match
+  int matches = 0;  ///< one-to-one feature matches between query and match
+  int inliers = 0;  ///< matches that fit one epipolar geometry
   StepTimes times = {};
-  /// Loops of the last few views, which this frame made sure: their frames had none. In order.
+  /// Loops of frames of the last few views, which are sure only since this frame. In order.
   std::vector<LateLoop> late_loops = {};
   /// Loops reported before, also late ones, that are more likely wrong than right after this frame.
   std::vector<LateLoop> withdrawn_loops = {};
   std::optional<OdometryPose> odometry = std::nullopt;  ///< what process() was given
   std::string name = {};  ///< of the image in its source; run() sets it
-  /// Of a map on a server: all that was committed up to this epoch, and nothing later, was known of
-  /// it, but for this session. 0 = no such map.
+  /// With a map on a server: the answer uses what was committed up to this epoch, nothing later,
+  /// and this session. 0 = no such map.
   std::int64_t epoch = 0;
 };
 

@@ -69,15 +69,15 @@ class LoopDetector {
   Detection process(const cv::Mat& image, std::optional<double> timestamp_s = std::nullopt,
                     Evidence* evidence = nullptr, const AllowedPlaces& allowed = {});
 
-  /// The same with what odometry says of the camera at this frame, if it says anything. Throws
-  /// Error (kind input) for that, too, see check_odometry().
+  /// The same with the odometry of this frame, if there is any. Throws Error (kind input) for a bad
+  /// pose, too, see check_odometry().
   Detection process(const cv::Mat& image, std::optional<double> timestamp_s,
                     const std::optional<OdometryPose>& odometry, Evidence* evidence = nullptr,
                     const AllowedPlaces& allowed = {});
 
   /// The same for an image whose content and features a MapStorage received in an earlier run. They
   /// give the answer that the image itself would give; set_mask() does not apply. Throws Error
-  /// (kind input) for features that are not whole, too.
+  /// (kind input) for incomplete features, too.
   Detection process(const BinaryContent& content, Features features,
                     std::optional<double> timestamp_s = std::nullopt,
                     const std::optional<OdometryPose>& odometry = std::nullopt);
@@ -105,8 +105,8 @@ class LoopDetector {
 
   /// The calibration of all images from now on, also of those in the map. Matches then have to
   /// agree with an epipolar geometry of rays, so that a fisheye is no obstacle. An image of another
-  /// size is an Error (kind input). The map does not store it. None = not known, as in the
-  /// beginning. Throws Error (kind input) if it cannot be right or has no size_px.
+  /// size is an Error (kind input). The map does not store it. None = not known, the initial state.
+  /// Throws Error (kind input) if it is not valid or has no size_px.
   void set_camera(const std::optional<CameraModel>& camera);
 
   /// Removes a place, such as a culled key frame, also from the map. From now on it is no candidate

@@ -60,7 +60,7 @@ struct DecisionOptions {
         Field{"reach_m", &S::reach_m, 0.1, 1e6,
               "with odometry: two views of one place are at most this far apart, m"},
         Field{"reach_up_m", &S::reach_up_m, 0.1, 1e6,
-              "with odometry: the same upwards in the image; storeys are 3 m apart"}};
+              "with odometry: the same up or down in the image; storeys are 3 m apart"}};
   }
 };
 
@@ -103,7 +103,7 @@ void validate(const LoopDetectorOptions& options);
 /// Throws Error (kind option) for an unknown name, or a value of the wrong type or out of range.
 void set_option(LoopDetectorOptions& options, const std::string& name, const std::string& value);
 
-/// The settings as JSON text: an object a section, a number or truth value a setting.
+/// The settings as JSON text: one object per section, one number or truth value per setting.
 std::string to_json(const LoopDetectorOptions& options);
 
 /// The defaults changed by what `json` names; `//` comments are allowed. `source` (a file name) is

@@ -42,7 +42,8 @@ class PlaceSearch {
   virtual void for_each_place(double unmoved, const Visit& visit) = 0;
 
   /// The places most similar to a content that is shifted by up to the tolerance: at most `number`,
-  /// and those as similar as the last of them. Damaged places count, but are left out.
+  /// and those as similar as the last of them. Damaged places count for `number`, but are
+  /// left out.
   virtual Similar most_similar(const BinaryContent& content, int shift_tolerance_columns,
                                std::size_t number) = 0;
 
@@ -85,7 +86,7 @@ class MapStorage {
   /// because places made with other settings cannot be compared.
   virtual void check_options(const LoopDetectorOptions& options) = 0;
 
-  /// If the map is only read, and its places can be searched where they are. Null otherwise.
+  /// Searches the map where its places are, if it is only read and can do so. Null otherwise.
   virtual PlaceSearch* place_search() { return nullptr; }
 
   /// Calls `visit` for each place of earlier sessions, in order.

@@ -17,7 +17,7 @@
 
 namespace loopbit {
 
-/// What a LoopGraph makes of a loop, and by which evidence.
+/// The verdict of a LoopGraph on a loop, and the evidence for it.
 enum class LoopVerdict {
   undecided,     ///< not solved yet, or it waits for a second loop that agrees
   kept,          ///< it is part of the solution
@@ -58,7 +58,7 @@ struct JudgedLoop {
   int compared = 0;  ///< loops nearby that it was compared with
   int agreeing = 0;  ///< those of them that agree with it
   double chi2 = 0;   ///< squared residual in units of its covariance, in the solution
-  double limit = 0;  ///< largest value of both that is not a contradiction
+  double limit = 0;  ///< largest odometry_chi2 or chi2 that is not a contradiction
 };
 
 struct LoopGraphOptions {
@@ -108,8 +108,8 @@ class LoopGraph {
   /// first of another session. Only loops connect it. Returns its number, from 0.
   int add_keyframe();
 
-  /// Adds a keyframe; `motion` is that since the keyframe before, T_from_to of which is from it to
-  /// the new one. Returns its number. Throws Error (kind input) if there is no keyframe before, the
+  /// Adds a keyframe. `motion`: since the keyframe before, with T_from_to from that one to the new
+  /// one. Returns its number. Throws Error (kind input) if there is no keyframe before, the
   /// motion is not rigid, or the covariance is not positive definite.
   int add_keyframe(const Motion& motion);
 
@@ -127,8 +127,7 @@ class LoopGraph {
   /// Number of keyframes.
   [[nodiscard]] int size() const;
 
-  /// The pose of a keyframe: x_world = T_world_keyframe x_keyframe. The first keyframe is the
-  /// world, also for keyframes that loops or odometry connect to it. Others have their own.
+  /// The pose of a keyframe: x_world = T_world_keyframe x_keyframe; see worlds().
   [[nodiscard]] cv::Matx44d pose(int keyframe) const;
 
   /// For each keyframe, the one that is the world of its pose(): the first that odometry and kept

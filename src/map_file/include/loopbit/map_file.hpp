@@ -145,7 +145,7 @@ class MapReader : public MapStorage {
   /// The size on disk.
   [[nodiscard]] std::int64_t bytes() const;
 
-  /// The faults that SQLite's integrity_check finds in the file. None of a map on a server.
+  /// The faults that SQLite's integrity_check finds in the file. Empty for a map on a server.
   [[nodiscard]] std::vector<std::string> check_structure() const;
 
   /// Of a map on a server, the address without passwords.
@@ -159,7 +159,7 @@ class MapReader : public MapStorage {
 
   /// From now on, a LoopDetector of this map sees what was committed up to this epoch, without what
   /// was removed or rejected since then. Throws Error (kind option) if the map is not on a server
-  /// or has not come so far.
+  /// or has not reached this epoch.
   void set_epoch(std::int64_t epoch);
 
   void check_options(const LoopDetectorOptions& options) override;
@@ -249,8 +249,8 @@ class MapWriter : public MapStorage {
   /// not take stays in queue().
   void finish();
 
-  /// The same, but as soon as `is_stopped()`, a server gets no more than two seconds, and none if
-  /// it did not take what came before.
+  /// The same, but once `is_stopped()` is true, waits at most two seconds for a server, and not at
+  /// all for one that did not take the frames before.
   void finish_unless(const std::function<bool()>& is_stopped);
 
   /// The damage that features() found so far; see MapReader::damage().

@@ -20,8 +20,8 @@ class MapServer {
   MapServer(MapServer&&) = delete;
   MapServer& operator=(MapServer&&) = delete;
 
-  /// The address without what is secret in it. Never throws Error: of an address that is not valid
-  /// only its beginning is left.
+  /// The address without its secrets; of an address that is not valid, only the beginning. Never
+  /// throws Error.
   [[nodiscard]] virtual std::string shown(const std::string& address) const = 0;
 
   /// The name of the database.

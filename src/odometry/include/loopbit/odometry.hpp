@@ -41,7 +41,7 @@ struct OdometryPose {
   /// x_odometry = T_odometry_camera x_camera, in metres: the pose of the *camera* (x right, y down,
   /// z forward) in any fixed frame. Only differences of poses are used.
   cv::Matx44d T_odometry_camera = cv::Matx44d::eye();
-  /// Of the motion since the last frame with odometry, as in Motion. None: OdometryDrift tells.
+  /// Of the motion since the last frame with odometry, as in Motion. None = by OdometryDrift.
   std::optional<cv::Matx66d> covariance = std::nullopt;
 };
 
@@ -70,7 +70,7 @@ Motion odometry_step(const cv::Matx44d& before, const OdometryPose& pose,
 /// symmetric and positive definite.
 bool is_valid(const OdometryPose& pose);
 
-/// Throws Error (kind input) unless it is. The message begins with `name`.
+/// Throws Error (kind input) unless is_valid(pose). The message begins with `name`.
 void check_odometry(const OdometryPose& pose, const std::string& name);
 
 /// Odometry along a session, with the drift between any two of its frames. Memory: 450 bytes per

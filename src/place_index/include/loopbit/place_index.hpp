@@ -29,6 +29,9 @@ struct Candidate {
 /// Upper bound of the distance between two centres M of contents, px.
 inline constexpr double kMaxCenterDistance_px = 90.0;
 
+/// Upper limit of RetrievalOptions::max_candidates.
+inline constexpr int kMaxCandidates = 1000;
+
 struct RetrievalOptions {
   int max_candidates = 30;
   double min_similarity = 0.2;
@@ -39,7 +42,8 @@ struct RetrievalOptions {
   static constexpr auto fields() {
     using S = RetrievalOptions;
     return std::tuple{
-        Field{"max_candidates", &S::max_candidates, 1, 1000, "similar places that are verified"},
+        Field{"max_candidates", &S::max_candidates, 1, kMaxCandidates,
+              "similar places that are verified"},
         Field{"min_similarity", &S::min_similarity, 0.0, 1.0,
               "smallest similarity xi of a candidate; 0 accepts every place that shares a pixel"},
         Field{"shift_tolerance_columns", &S::shift_tolerance_columns, 0, 32,

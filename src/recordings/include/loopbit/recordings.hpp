@@ -47,8 +47,8 @@ RecordingInfo read_recording_info(const std::string& input);
 ///
 /// Frames come in the order in which they were recorded. Their time is that of the header; where
 /// that is 0, the time of recording. Their name is this time with nine decimals. A recording that
-/// is cut off or lacks its index is read as far as it goes; early_end() then tells. Damaged chunks
-/// are left out, and told there, too.
+/// is cut off or lacks its index is read as far as it goes; early_end() then says so. It also
+/// reports damaged chunks, which are left out.
 ///
 /// `odometry_topic`: if not empty, gives each frame the pose of the camera that is nearest in time
 /// (Frame::T_odometry_camera), from messages nav_msgs Odometry, tf2_msgs TFMessage, or

@@ -20,7 +20,7 @@
 
 namespace loopbit {
 
-/// What came of the estimate of a relative pose.
+/// The outcome of the estimate of a relative pose.
 enum class PoseStatus {
   measured,         ///< `known` says how much
   few_matches,      ///< too few matches for any geometry
@@ -36,7 +36,7 @@ inline constexpr std::array kAllPoseStatuses{PoseStatus::measured,        PoseSt
                                              PoseStatus::little_parallax, PoseStatus::plane,
                                              PoseStatus::ambiguous};
 
-/// What came of the search for the length of the translation.
+/// The outcome of the search for the length of the translation.
 enum class ScaleStatus {
   not_asked,  ///< neither depth nor a baseline was given
   known,
@@ -96,7 +96,7 @@ struct NearbyView {
 struct PoseRequest {
   PoseView query;
   PoseView match;
-  /// Feature matches of the two. Empty: they are found, which takes most of the time.
+  /// Feature matches of the two. If empty, they are found, which takes most of the time.
   std::span<const Match> matches = {};
   /// Metres along z for each pixel of the match's image (of any resolution); 0 or NaN = unknown.
   const cv::Mat1f* match_depth_m = nullptr;

@@ -62,8 +62,8 @@ struct RunRequest {
   /// A folder with the images of a second camera, named like those of the run, so that translations
   /// get a length. Needs `camera`; excludes `depth`. Empty = none.
   std::string right = {};
-  /// Of a rectified pair, metres: the second camera is as the first, so far to the right of it. 0 =
-  /// the calibration in the folder tells, or the second camera of `camera_file`.
+  /// Of a rectified pair, metres: the second camera is like the first, this far to the right of it.
+  /// 0 = by the calibration in the folder, or the second camera of `camera_file`.
   double baseline_m = 0;
   std::vector<std::string> other_inputs = {};  ///< more files that are never replaced
 };
@@ -73,7 +73,7 @@ struct RunRequest {
 /// pixels.
 cv::Mat1b read_mask(const std::string& file);
 
-/// What came of a run.
+/// The outcome of a run.
 struct RunOutcome {
   std::string folder;
   RunRecord record;

@@ -33,6 +33,10 @@ struct Features {
   std::size_t num_dark = 0;
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;
+
+  [[nodiscard]] const Keypoint& keypoint(int index) const {
+    return keypoints[static_cast<std::size_t>(index)];
+  }
 };
 
 struct SurfOptions {

@@ -99,8 +99,8 @@ std::vector<Match> epipolar_inliers(const Features& query, const Features& place
                                     const std::vector<Match>& matches, double max_error_px,
                                     const CameraModel* camera = nullptr);
 
-/// So many inliers are chance: one more than the matches that always have such a geometry. These
-/// are 7 for a fundamental matrix, and 5 for an essential one.
+/// Up to this many inliers are chance: one more than the matches that always have a geometry, which
+/// are 7 for a fundamental matrix and 5 for an essential one.
 int chance_inliers(const Features& query, const Features& place, const CameraModel* camera);
 
 /// Counts the inliers that lie apart in both images, greedily in their order: at least
