@@ -61,10 +61,11 @@ std::vector<unsigned char> read_bytes(const fs::path& file) {
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
-  if (!stream) {
+  if (!stream.is_open() || stream.bad()) {
     fail(image_thing(file), fmt::format("cannot be read ({}): check its permissions and the disk",
                                         std::generic_category().message(errno)));
   }
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));  // another program may have cut it
   return bytes;
 }
 

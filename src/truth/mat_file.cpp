@@ -134,7 +134,7 @@ std::string fault_of_mat_file(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
   if (error || !stream) {
     return fmt::format("cannot be read ({}): check its permissions",
-                       std::generic_category().message(errno));
+                       error ? error.message() : std::generic_category().message(errno));
   }
   std::array<std::byte, kHeaderBytes> header{};
   if (!read(stream, header)) return fmt::format("is cut off after {} bytes: copy it again", bytes);
