@@ -58,6 +58,9 @@ class GrowingMap : public MapStorage {
 
   void tell(const MapNews::Loop& loop) { loops_.push_back(loop); }
 
+  /// How often features were asked for.
+  [[nodiscard]] int asked() const { return asked_; }
+
   void check_options(const LoopDetectorOptions& /*options*/) override {}
   void for_each_earlier_place(const Visit& visit) override {
     for (std::size_t i = 0; i < earlier_; ++i) visit(theirs_[i].at, theirs_[i].content);
@@ -73,6 +76,7 @@ class GrowingMap : public MapStorage {
     return news;
   }
   std::shared_ptr<const Features> features(PlaceId place) override {
+    ++asked_;
     const auto number = static_cast<std::size_t>(place < 0 ? -(place + 1) : place);
     if (place < 0) return theirs_[earlier_ + number].features;
     return number < earlier_ ? theirs_[number].features : ours_[number - earlier_];
@@ -97,6 +101,7 @@ class GrowingMap : public MapStorage {
   std::size_t earlier_ = 0;
   std::size_t known_ = 0;
   std::size_t told_ = 0;
+  int asked_ = 0;
 };
 
 TEST_F(MapSession, NewsBeforeTheFirstFrameIsAsAnEarlierSession) {
@@ -229,6 +234,18 @@ TEST_F(MapSession, TimesOfEarlierSessionsDoNotMatter) {
       EXPECT_EQ(detection.status, session == 1 ? Status::no_earlier_place : Status::loop);
     }
   }
+}
+
+TEST_F(MapSession, WithAFixedWindowRemovedPlacesLeaveNoFeatures) {
+  drive(0, 0);
+  LoopDetectorOptions options = fast_options();
+  options.exclusion.frames = 10;
+  const auto map = std::make_shared<GrowingMap>(path("map.db"), 7);
+  LoopDetector detector(options, map);
+  for (int place = 0; place < kPlaces; ++place) detector.process(view(place));
+  const int before = map->asked();
+  detector.remove({0, 2});  // only the features of the latest change of view are kept
+  EXPECT_EQ(map->asked(), before);
 }
 
 TEST_F(MapSession, QueriesRankThePlacesOfAllSessions) {
