@@ -17,11 +17,9 @@ constexpr double kReturn = 0.01;
 /// of the same path, each has less to say, and the path ends at it more seldom.
 constexpr double kLeaveIndependent = 3 * kLeave;
 /// A path is followed at 0, 1 or 2 steps per step, most likely at the speed of before.
-constexpr std::array kMoves{0.25, 0.5, 0.25};
+constexpr std::array<double, kMaxMove + 1> kMoves{0.25, 0.5, 0.25};
 /// Robots seldom turn round on a path.
 constexpr double kTurn = 0.01;
-
-constexpr std::ptrdiff_t kMostMoved = kMoves.size() - 1;
 
 /// The item of `step`, or the end. `items`: in the order of steps.
 template <typename Items>
@@ -60,11 +58,11 @@ class Ratios {
 
   /// Of the steps that `step` can be reached from or leads to, in order. What could not be
   /// predicted, such as an excluded step, was left for elsewhere.
-  [[nodiscard]] std::array<Hypothesis, 2 * kMostMoved + 1> around(std::ptrdiff_t step) const {
-    std::array<Hypothesis, 2 * kMostMoved + 1> near{};
-    auto found = std::ranges::lower_bound(ratios_, step - kMostMoved, {}, &Hypothesis::step);
+  [[nodiscard]] std::array<Hypothesis, 2 * kMaxMove + 1> around(std::ptrdiff_t step) const {
+    std::array<Hypothesis, 2 * kMaxMove + 1> near{};
+    auto found = std::ranges::lower_bound(ratios_, step - kMaxMove, {}, &Hypothesis::step);
     for (Hypothesis& h : near) {
-      h = {step - kMostMoved + (&h - near.data()), away_, away_};
+      h = {step - kMaxMove + (&h - near.data()), away_, away_};
       if (found != ratios_.end() && found->step == h.step) h = *found++;
     }
     return near;
@@ -158,8 +156,8 @@ Belief one_step_earlier(const Belief& belief, const Belief& prior, const Returns
     double forward = 0;
     double backward = 0;
     for (std::size_t moved = 0; moved < kMoves.size(); ++moved) {
-      forward += kMoves[moved] * near[kMostMoved + moved].forward;
-      backward += kMoves[moved] * near[kMostMoved - moved].backward;
+      forward += kMoves[moved] * near[kMaxMove + moved].forward;
+      backward += kMoves[moved] * near[kMaxMove - moved].backward;
     }
     const double turned = kTurn * (forward + backward);
     const double left = prior.leave * ratios.away();

@@ -47,6 +47,9 @@ Hypothesis& hypothesis_at(std::vector<Hypothesis>& places, std::ptrdiff_t step);
 // How a robot moves: it follows an earlier path forward or backward at up to two steps per step,
 // turns round on it, leaves it, or returns anywhere. docs/method.md, section 4, has the model.
 
+/// A path moves by so many steps per step, at most.
+inline constexpr std::ptrdiff_t kMaxMove = 2;
+
 /// `num_steps`: how many there are to return to. `steps`: those that were looked at.
 /// `weight(step)`: 0 to 1, how well the return agrees with odometry.
 Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,

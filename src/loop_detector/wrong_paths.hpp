@@ -6,10 +6,9 @@
 #include <utility>
 #include <vector>
 
-namespace loopbit {
+#include "path_motion.hpp"
 
-/// A path moves by so many steps per step, at most.
-inline constexpr std::ptrdiff_t kMaxMove = 2;
+namespace loopbit {
 
 /// A value of each step, in the order of the steps.
 using ByStep = std::vector<std::pair<std::ptrdiff_t, double>>;
