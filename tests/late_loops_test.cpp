@@ -171,15 +171,22 @@ TEST(LateLoops, ItLooksBackABoundedWay) {
 TEST(PathMotion, APathEndsMoreSeldomWhereEachStepCountsLess) {
   const Belief belief{{{100, 0.6, 0.4}}};
   for (const auto& [independence, leave] : {std::pair{1.0, 0.01}, {0.5, 0.01}, {0.1, 0.003}}) {
-    const Belief later = one_step_later(belief, independence);
+    const Belief later = one_step_later(belief, leave_probability(independence, {}));
     EXPECT_NEAR(later.leave, leave, 1e-12) << independence;
     EXPECT_NEAR(later.elsewhere(), leave, 1e-12) << independence;
   }
 }
 
+TEST(PathMotion, APathThatLastedIsLeftMoreSeldom) {
+  EXPECT_NEAR(leave_probability(1, {.steps = 100, .independent = 100}), 1.0 / 200, 1e-12);
+  // At ten times the frame rate, ten times as many steps are worth as much.
+  EXPECT_NEAR(leave_probability(0.1, {.steps = 1000, .independent = 100}), 0.1 / (100 + 100 / 3.0),
+              1e-12);
+}
+
 TEST(PathMotion, OneStepEarlierUndoesOneStepLater) {
   Belief belief{{{100, 0.4, 0.1}, {200, 0.2, 0.0}}};
-  Belief prior = one_step_later(belief, 1);
+  Belief prior = one_step_later(belief, 0.01);
   const Returns returns = returns_to({100, 101, 500, 100}, kSteps,
                                      [](std::ptrdiff_t step) { return step == 101 ? 0.5 : 1.0; });
   ASSERT_EQ(returns.size(), 3U);

@@ -138,7 +138,7 @@ TEST(PlaceFilter, LeavesAPathAndReturns) {
   EXPECT_GT(robot.follow(100, 1, 15, kByNight).revisit, 0.98);
   PlaceFilter::Update update;
   // Wherever the path may go on, there is no more than elsewhere.
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 25; ++i) {
     FoundAt found;
     for (const auto step : PlaceFilter::likeliest(robot.filter.predict(true), 1e-4, 3)) {
       for (int beside = -2; beside <= 2; ++beside) found[step + beside] = {.votes = 3};
@@ -149,6 +149,18 @@ TEST(PlaceFilter, LeavesAPathAndReturns) {
   update = robot.follow(200, 1, 15, kByNight);
   EXPECT_GT(update.probability, 0.98);
   EXPECT_EQ(matched_step(update), 214);
+}
+
+TEST(PlaceFilter, APathThatLastedIsLeftMoreSeldomUntilItEnds) {
+  FilterRobot robot;
+  robot.follow(100, 1, 15, kByNight);
+  const double early = robot.filter.predict(true).leave;
+  robot.follow(115, 1, 100, kByNight);
+  const double late = robot.filter.predict(true).leave;
+  EXPECT_LT(late, 0.6 * early);
+  robot.filter.withdraw(214, robot.loops);
+  robot.see({});
+  EXPECT_GT(robot.filter.predict(true).leave, late);
 }
 
 /// Ten steps along 100 and along another path with the same votes.

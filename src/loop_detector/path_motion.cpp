@@ -9,13 +9,13 @@
 namespace loopbit {
 namespace {
 
-/// A robot follows an earlier path for a hundred changes of view on average, and is somewhere new
-/// for as long in between. Where frames say little, such as by night, this limits the score.
-constexpr double kLeave = 0.01;
-constexpr double kReturn = 0.01;
+/// A robot is somewhere new for a hundred changes of view on average, and then follows an earlier
+/// path for about as long. Where frames say little, such as by night, this limits the score.
+constexpr double kUsualSteps = 100;
+constexpr double kReturn = 1 / kUsualSteps;
 /// A hundred changes of view are 33 independent ones, as long as nothing is known. With more images
 /// of the same path, each has less to say, and the path ends at it more seldom.
-constexpr double kLeaveIndependent = 3 * kLeave;
+constexpr double kUsualIndependent = kUsualSteps / 3;
 /// A path is followed at 0, 1 or 2 steps per step, most likely at the speed of before.
 constexpr std::array<double, kMaxMove + 1> kMoves{0.25, 0.5, 0.25};
 /// Robots seldom turn round on a path.
@@ -118,8 +118,14 @@ Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,
   return returns;
 }
 
-Belief one_step_later(const Belief& belief, double independence) {
-  const double leave = std::min(kLeave, kLeaveIndependent * independence);
+/// The mean of a rate that is not known, as if one path had ended after the usual number of steps.
+/// The longer the robot has followed its path, the longer that is expected to go on.
+double leave_probability(double independence, const Followed& followed) {
+  return std::min(1 / (kUsualSteps + followed.steps),
+                  independence / (kUsualIndependent + followed.independent));
+}
+
+Belief one_step_later(const Belief& belief, double leave) {
   std::map<std::ptrdiff_t, Hypothesis> next;
   for (const Hypothesis& h : belief.places) {
     const double forward = (1 - leave) * ((1 - kTurn) * h.forward + kTurn * h.backward);

@@ -58,9 +58,18 @@ Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,
 /// That a robot which returns does so to a certain one of `num_steps` steps.
 double from_anywhere(std::ptrdiff_t num_steps);
 
-/// Where the robot is one step later, if it follows a path. `independence`: how many independent
-/// witnesses a step is worth, see WrongPaths.
-Belief one_step_later(const Belief& belief, double independence);
+/// How long the robot has followed the path that it follows now.
+struct Followed {
+  double steps = 0;
+  double independent = 0;  ///< what they are worth in independent witnesses, see WrongPaths
+};
+
+/// The probability that the robot leaves its path at the next step. `independence`: how many
+/// independent witnesses that step is worth.
+double leave_probability(double independence, const Followed& followed);
+
+/// Where the robot is one step later, if it follows a path and leaves it with probability `leave`.
+Belief one_step_later(const Belief& belief, double leave);
 
 /// Adds what a robot elsewhere may return to.
 void add_returns(const Returns& returns, Belief& belief);

@@ -236,7 +236,8 @@ std::optional<std::size_t> PlaceFilter::match_near(std::ptrdiff_t middle,
 }
 
 Belief PlaceFilter::predict(bool is_step) const {
-  return is_step ? one_step_later(belief_, votes_.independence()) : before_;
+  if (!is_step) return before_;
+  return one_step_later(belief_, leave_probability(votes_.independence(), followed_));
 }
 
 std::vector<std::ptrdiff_t> PlaceFilter::likeliest(const Belief& belief, double min_probability,
@@ -375,9 +376,19 @@ PlaceFilter::Next PlaceFilter::prepare(Update update, bool is_step, const KnownL
     learn(update, loops, next);
     for (const auto& [step, sigmas] : next.sigmas) shown_.try_emplace(step);
     next.before = std::move(update.prior);
+    next.followed = followed_until(update.belief);
   }
   next.belief = std::move(update.belief);
   return next;
+}
+
+/// Where the likeliest step is at another place than before, another path begins.
+Followed PlaceFilter::followed_until(const Belief& belief) const {
+  const auto before = belief_.peak();
+  const auto now = belief.peak();
+  const bool goes_on = before && now && std::abs(*now - *before) <= kOnePathSteps;
+  if (!goes_on || belief.elsewhere() > 0.5) return {};
+  return {followed_.steps + 1, followed_.independent + votes_.independence()};
 }
 
 /// What is not near the likeliest place was wrong, as far as the robot is somewhere new.
@@ -430,6 +441,7 @@ void PlaceFilter::learn_steady(const Update& update, std::vector<Observed> wrong
 void PlaceFilter::commit(Next next) noexcept {
   belief_ = std::move(next.belief);
   if (!next.is_step) return;
+  followed_ = next.followed;
   before_ = std::move(next.before);
   tail_ = next.tail;
   steady_.commit(std::move(next.steady));

@@ -117,6 +117,7 @@ class PlaceFilter {
     WrongPaths::Next votes = {};
     SteadyDisplacements::Next steady = {};
     Tail tail = {};
+    Followed followed = {};
     double products = 0;
     double squares = 0;
     bool is_step = false;
@@ -151,11 +152,13 @@ class PlaceFilter {
       const std::optional<SteadyDisplacements::Seen>& steady) const;
   [[nodiscard]] double geometry_log_ratio(const CandidateGeometry& geometry,
                                           std::ptrdiff_t num_steps) const;
+  [[nodiscard]] Followed followed_until(const Belief& belief) const;
   void learn(const Update& update, const KnownLoops& loops, Next& next) const;
   void learn_steady(const Update& update, std::vector<Observed> wrong, Next& next) const;
 
   Belief before_;  ///< predicted for the last step
   Belief belief_;  ///< of the last frame
+  Followed followed_;
   ByStep latest_sigmas_;
   std::unordered_map<std::ptrdiff_t, Shown> shown_;  ///< by step
   WrongPaths votes_;                                 ///< their deviations
