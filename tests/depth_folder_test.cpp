@@ -23,6 +23,7 @@
 #include "loopbit/record_run.hpp"
 #include "loopbit/text_rows.hpp"
 #include "loopbit/world.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "test_support.hpp"
 
@@ -267,6 +268,26 @@ void expect_matched(const std::string& folder) {
   EXPECT_EQ(found, expected);
 }
 
+/// read_run() says where a rotation is none, of which OpenCV makes no matrix.
+void expect_damaged_rotations_are_named(const std::string& folder) {
+  constexpr int kQx = 8;
+  const std::string file = folder + "/relative_poses.csv";
+  std::istringstream whole(read_file(file));
+  std::string header;
+  std::getline(whole, header);
+  std::string damaged = header + '\n';
+  for (std::string line; std::getline(whole, line);) {
+    std::size_t begin = 0;
+    for (int column = 0; column < kQx; ++column) begin = line.find(',', begin) + 1;
+    std::size_t end = begin;
+    for (int column = 0; column < 4; ++column) end = line.find(',', end) + 1;
+    damaged += line.replace(begin, end - begin, "0,0,0,0,") + '\n';
+  }
+  write_file(file, damaged);
+  test::expect_error(ErrorKind::input, {"relative_poses.csv', line", "column 9, reads '0'"},
+                     [&] { (void)read_run(folder); });
+}
+
 TEST_F(DepthFolderTest, ARunWithDepthMeasuresMetres) {
   WorldOptions options;
   options.frames = 84;
@@ -299,6 +320,7 @@ TEST_F(DepthFolderTest, ARunWithDepthMeasuresMetres) {
   expect_graph(path("run"));
   expect_read_back(path("run"));
   expect_matched(path("run"));
+  expect_damaged_rotations_are_named(path("run"));
 }
 
 class RightImagesTest : public DepthFolderTest {

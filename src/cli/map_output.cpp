@@ -3,11 +3,9 @@
 #include "map_output.hpp"
 
 #include <filesystem>
-#include <system_error>
 
 #include <fmt/format.h>
 
-#include "loopbit/error.hpp"
 #include "loopbit/write_file.hpp"
 
 #include "process.hpp"

@@ -37,10 +37,10 @@ bool is_forbidden(sqlite3* handle) {
 /// Of the last failure: the system's own words where a file could not be opened.
 const char* reason_of(sqlite3* handle, const std::string& path) {
   int system_error = sqlite3_system_errno(handle);
-  if (sqlite3_errcode(handle) != SQLITE_CANTOPEN || system_error == 0)
-    return sqlite3_errmsg(handle);
+  const bool unopened = sqlite3_errcode(handle) == SQLITE_CANTOPEN && system_error != 0;
+  if (!unopened) return sqlite3_errmsg(handle);
   if (system_error == ENOENT) {
-    // A file that cannot be made was then to be read only, which it cannot, either.
+    // If SQLite cannot make a file, it tries to read it. Then only the folder tells why.
     const auto folder = std::filesystem::absolute(path).parent_path();
     if (faccessat(AT_FDCWD, folder.c_str(), W_OK, AT_EACCESS) != 0) system_error = errno;
   }
