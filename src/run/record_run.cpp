@@ -63,8 +63,8 @@ void check_from_start(const RunInput& input, const RunRequest& request) {
        {scoring.truth, scoring.not_false, scoring.ignore, request.poses, request.odometry}) {
     if (file.empty()) continue;
     throw Error(ErrorKind::option,
-                fmt::format("'{}' counts from the first frame and cannot be used after {} of '{}'; "
-                            "open it again.",
+                fmt::format("'{}' counts from the first frame, with {} of '{}' already read; open "
+                            "it again.",
                             file, counted(input.taken(), "frame"), input.input()));
   }
 }
