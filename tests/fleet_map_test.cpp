@@ -4,8 +4,10 @@
 // fleet_command_test.py starts one.
 #include "loopbit/fleet_map.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,6 +24,8 @@
 #include "loopbit/map_server.hpp"
 #include "loopbit/map_tools.hpp"
 
+#include "file_database.hpp"
+#include "map_follower.hpp"
 #include "map_support.hpp"
 #include "test_support.hpp"
 
@@ -215,6 +219,32 @@ TEST_F(FleetMap, ARobotLearnsWhatOthersAddMeanwhile) {
   learn_until(7);
   EXPECT_EQ(all.places.size(), 4U);
   EXPECT_EQ(me.unverified(), 0);
+}
+
+TEST_F(FleetMap, ASessionIsNewsAlsoIfTheFirstReadFails) {
+  MapWriter other(address, fast_options(), "other");
+  add_frame(other, 0);
+  other.flush();
+  sql("ALTER TABLE loopbit.loop RENAME TO away");
+  MapFollower follower(open_map(address, MapDatabase::Access::read), 7, 0, {},
+                       [](const MapSession&) {});
+  MapFollower::News all;
+  const auto take_until = [&](const auto& is_enough) {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+    while (!is_enough() && std::chrono::steady_clock::now() < end) {
+      MapFollower::News news = follower.take();
+      std::ranges::move(news.sessions, std::back_inserter(all.sessions));
+      std::ranges::move(news.places, std::back_inserter(all.places));
+      std::ranges::move(news.notices, std::back_inserter(all.notices));
+    }
+  };
+  take_until([&] { return !all.notices.empty(); });
+  EXPECT_TRUE(all.places.empty());
+  sql("ALTER TABLE loopbit.away RENAME TO loop");
+  take_until([&] { return !all.places.empty(); });
+  EXPECT_EQ(all.places.size(), 1U);
+  ASSERT_EQ(all.sessions.size(), 1U);
+  EXPECT_EQ(all.sessions[0].session, other.session());
 }
 
 TEST_F(FleetMap, ARobotRecognisesPlacesOfSeveralServers) {

@@ -69,8 +69,8 @@ void MapFollower::run() {
       follow();
       pause.reset();
       note({});
-    } catch (const Error& error) {
-      note(error);
+    } catch (const std::exception& error) {  // also if there is no memory
+      note(error.what());
       std::unique_lock lock(mutex_);
       changed_.wait_for(lock, pause.next(), [this] { return stop_; });
     }
@@ -78,12 +78,12 @@ void MapFollower::run() {
 }
 
 /// How an attempt ended, if it is another way than the last one.
-void MapFollower::note(const std::optional<Error>& fault) {
+void MapFollower::note(const std::optional<std::string>& fault) {
   if (std::exchange(is_lost_, fault.has_value()) == fault.has_value()) return;
   const std::lock_guard lock(mutex_);
   news_.notices.push_back(
       fault ? fmt::format("Places of '{}' that were not read are no matches until it answers: {}",
-                          database_->path(), fault->what())
+                          database_->path(), *fault)
             : fmt::format("'{}' answers again.", database_->path()));
 }
 
@@ -108,7 +108,7 @@ void MapFollower::read(std::int64_t epoch) {
   for_each_new_place(
       *database_, epochs,
       [&](const MapPlace& place) {
-        if (is_of_use(place.at.session, news)) news.places.push_back(place);
+        if (is_of_use(place.at.session)) news.places.push_back(place);
       },
       damage_);
   const auto by_others = [this](std::vector<MapLoop> loops) {
@@ -120,14 +120,14 @@ void MapFollower::read(std::int64_t epoch) {
   epoch_ = epoch;
   const std::lock_guard lock(mutex_);
   news_.epoch = epoch;
-  append(news_.sessions, std::move(news.sessions));
   append(news_.places, std::move(news.places));
   append(news_.loops, std::move(news.loops));
   append(news_.rejected, std::move(news.rejected));
 }
 
-/// Adds a session that was not known to `news`.
-bool MapFollower::is_of_use(int session, News& news) {
+/// A session that was not known is news at once: if what follows fails, it is known when that is
+/// read again.
+bool MapFollower::is_of_use(int session) {
   if (session == session_ || ignored_.contains(session)) return false;
   if (known_.contains(session)) return true;
   for (const MapSession& found : read_sessions(*database_, damage_, {session, session})) {
@@ -136,7 +136,8 @@ bool MapFollower::is_of_use(int session, News& news) {
     } catch (const Error&) {
       break;
     }
-    news.sessions.push_back(found);
+    const std::lock_guard lock(mutex_);
+    news_.sessions.push_back(found);
     known_.insert(session);
     return true;
   }

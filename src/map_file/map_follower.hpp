@@ -54,8 +54,8 @@ class MapFollower {
   void run();
   void follow();
   void read(std::int64_t epoch);
-  void note(const std::optional<Error>& fault);
-  [[nodiscard]] bool is_of_use(int session, News& news);
+  void note(const std::optional<std::string>& fault);
+  [[nodiscard]] bool is_of_use(int session);
   [[nodiscard]] bool has_stopped() const;
 
   std::unique_ptr<MapDatabase> database_;

@@ -129,8 +129,8 @@ void ServerFeatures::run() {
         read_next(lock);
       }
       pause.reset();
-    } catch (const Error&) {  // the upload or the follower says so
-      lock.lock();
+    } catch (const std::exception&) {  // the upload or the follower says so
+      if (!lock.owns_lock()) lock.lock();
       is_away_ = true;
       std::erase_if(blocks_, [](const Block& block) { return !block.is_read; });
       read_.notify_all();
@@ -143,7 +143,7 @@ std::deque<ServerFeatures::Block>::iterator ServerFeatures::unread() {
   return std::ranges::find_if(blocks_, [](const Block& block) { return !block.is_read; });
 }
 
-// The two throw Error, and the lock is not held, if the server is lost.
+// The two throw, with or without the lock, if the server is lost or there is no memory.
 
 void ServerFeatures::reach_again(std::unique_lock<std::mutex>& lock) {
   lock.unlock();

@@ -189,6 +189,8 @@ void SessionUpload::run() {
       was_lost = attempt();
     } catch (const Error& error) {
       fault = error;
+    } catch (const std::exception& error) {  // no memory: later there may be some
+      fault = Error(ErrorKind::output, error.what());
     }
     lock.lock();
     ++attempts_;
