@@ -411,13 +411,13 @@ class CommandLineTest(CommandTest):
 
     def test_settings_from_file_and_by_name(self):
         config = self.scratch / "settings.json"
-        config.write_text('{"decision": {"min_score": 1000.0}, // nothing passes\n'
+        config.write_text('{"decision": {"min_score": 1.0}, // nothing passes\n'
                           ' "surf": {"max_keypoints": 100}}')
         ran = loopbit("run", self.few_images(), "--out", self.out, "--config", config,
                       "--set", "surf.max_keypoints=200")
         self.assertEqual(ran.returncode, 0, ran.stderr)
         options = json.loads((self.out / "run.json").read_text())["options"]
-        self.assertEqual(options["decision"]["min_score"], 1000.0)
+        self.assertEqual(options["decision"]["min_score"], 1.0)
         self.assertEqual(options["surf"]["max_keypoints"], 200)
 
     @repeats_when_sanitized

@@ -154,7 +154,7 @@ TEST_F(MapLink, SettingsMayDifferButForThoseOfPlaces) {
   expect_error(ErrorKind::option, {"merged.db", "surf.max_keypoints"},
                [&] { link_map(path("merged.db"), options); });
   options = fast_options();
-  options.decision.min_score = 1e9;
+  options.decision.min_score = 1;
   EXPECT_EQ(link_map(path("merged.db"), options).loops, 0);
 }
 

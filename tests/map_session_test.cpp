@@ -291,7 +291,7 @@ TEST_F(MapSession, PlacesWithoutTheirFeaturesAreNeverMatched) {
 TEST_F(MapSession, ADetectorOfOtherSettingsIsRefused) {
   drive(0, 3);
   LoopDetectorOptions options = fast_options();
-  options.decision.min_score = 2;  // shapes no place
+  options.decision.min_score = 1;  // shapes no place
   const auto map = std::make_shared<MapReader>(path("map.db"));
   const auto writer = std::make_shared<MapWriter>(path("new.db"), fast_options(), "drive");
   options.surf.max_keypoints = 200;

@@ -161,6 +161,21 @@ TEST(Validation, OfAllSectionsNamesTheSection) {
   expect_error(ErrorKind::option, {"decision.min_score is -1"}, [&] { validate(options); });
 }
 
+TEST(Validation, TheScoreIsAProbabilityOrANumberOfMatches) {
+  LoopDetectorOptions options;
+  options.decision.min_score = 1;
+  EXPECT_NO_THROW(validate(options));
+  options.decision.min_score = 30;
+  expect_error(ErrorKind::option, {"decision.min_score is 30", "count_matches=false", "at most 1"},
+               [&] { validate(options); });
+  options.decision.count_matches = true;
+  EXPECT_NO_THROW(validate(options));
+  options.decision.min_score = 0.98;
+  expect_error(ErrorKind::option,
+               {"decision.min_score is 0.98", "count_matches=true", "at least 1"},
+               [&] { validate(options); });
+}
+
 TEST(Validation, ExclusionIsFixedByFramesOrBySeconds) {
   LoopDetectorOptions options;
   options.exclusion.frames = 30;
@@ -286,7 +301,7 @@ LoopDetectorOptions changed_options() {
   options.surf = {8000, 123, false};
   options.verification = {40, 3, 0.75, 11, 1.3, 4.5};
   options.exclusion = {5, 40, 0.0, 17};
-  options.decision = {0.875, true};
+  options.decision = {87.5, true};
   return options;
 }
 
@@ -299,7 +314,7 @@ TEST(OptionsJson, HoldsChangedValues) {
   EXPECT_FALSE(read.surf.upright);
   EXPECT_EQ(read.verification.max_ratio, 0.75);
   EXPECT_EQ(read.exclusion.frames, 40);
-  EXPECT_EQ(read.decision.min_score, 0.875);
+  EXPECT_EQ(read.decision.min_score, 87.5);
   EXPECT_TRUE(read.decision.count_matches);
 }
 
@@ -322,7 +337,7 @@ TEST(OptionsJson, CommentsAreAllowed) {
 }
 
 TEST(OptionsJson, WholeNumbersAreNumbersToo) {
-  EXPECT_EQ(options_from_json(R"({"decision": {"min_score": 30}})", "t").decision.min_score, 30.0);
+  EXPECT_EQ(options_from_json(R"({"decision": {"min_score": 1}})", "t").decision.min_score, 1.0);
 }
 
 void expect_json_error(const std::string& json, std::initializer_list<std::string_view> parts) {

@@ -100,6 +100,15 @@ void validate(const LoopDetectorOptions& options) {
                             "them can fix the window; set the other to 0.",
                             options.exclusion.frames, options.exclusion.seconds));
   }
+  const DecisionOptions& decision = options.decision;
+  if (decision.count_matches ? decision.min_score < 1 : decision.min_score > 1) {
+    throw Error(
+        ErrorKind::option,
+        fmt::format("decision.min_score is {}, but with decision.count_matches={} it must be {}.",
+                    decision.min_score, decision.count_matches,
+                    decision.count_matches ? "a number of matches, at least 1"
+                                           : "a probability, at most 1"));
+  }
 }
 
 void set_option(LoopDetectorOptions& options, const std::string& name, const std::string& value) {

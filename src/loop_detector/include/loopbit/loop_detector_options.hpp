@@ -53,7 +53,8 @@ struct DecisionOptions {
     return std::tuple{
         Field{"min_score", &S::min_score, 0.0, 1e9,
               "smallest score of an accepted match: the probability that it is right. 0.98 = a "
-              "wrong loop costs as much as 49 missed ones"},
+              "wrong loop costs as much as 49 missed ones. With count_matches: the number of "
+              "matches"},
         switch_field("count_matches", &S::count_matches,
                      "the score is the number of matches, without geometry or frames before, as in "
                      "the paper"),
