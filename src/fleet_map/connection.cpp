@@ -99,11 +99,9 @@ constexpr std::chrono::milliseconds kSlice{20};
 PGconn* connect(const Address& address, const std::atomic<bool>& is_interrupted) {
   if (is_interrupted) return nullptr;
   using Handle = std::unique_ptr<PGconn, decltype(&PQfinish)>;
-  std::promise<Handle> promise;
-  std::future<Handle> connected = promise.get_future();
-  std::thread([address, promise = std::move(promise)]() mutable {
-    promise.set_value(Handle(connect(address), PQfinish));
-  }).detach();
+  std::packaged_task<Handle()> task([address] { return Handle(connect(address), PQfinish); });
+  std::future<Handle> connected = task.get_future();
+  std::thread(std::move(task)).detach();
   while (connected.wait_for(kSlice) != std::future_status::ready) {
     if (is_interrupted) return nullptr;
   }

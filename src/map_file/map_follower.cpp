@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <exception>
 #include <iterator>
 #include <utility>
 
@@ -104,7 +105,7 @@ void MapFollower::follow() {
 /// What was committed up to `epoch`.
 void MapFollower::read(std::int64_t epoch) {
   const EpochRange epochs{epoch_, epoch};
-  News news{.epoch = epoch};
+  News news;
   for_each_new_place(
       *database_, epochs,
       [&](const MapPlace& place) {
@@ -117,16 +118,15 @@ void MapFollower::read(std::int64_t epoch) {
   };
   news.loops = by_others(read_new_loops(*database_, "loop", epochs, damage_));
   news.rejected = by_others(read_new_loops(*database_, "rejected", epochs, damage_));
-  epoch_ = epoch;
   const std::lock_guard lock(mutex_);
-  news_.epoch = epoch;
   append(news_.places, std::move(news.places));
   append(news_.loops, std::move(news.loops));
   append(news_.rejected, std::move(news.rejected));
+  epoch_ = news_.epoch = epoch;  // last: what fails is read again
 }
 
-/// A session that was not known is news at once: if what follows fails, it is known when that is
-/// read again.
+/// Makes a session that was not known news at once. If reading fails afterwards, the next attempt
+/// finds it known and would not tell of it.
 bool MapFollower::is_of_use(int session) {
   if (session == session_ || ignored_.contains(session)) return false;
   if (known_.contains(session)) return true;
