@@ -84,6 +84,19 @@ TEST(AttachedParts, AViewWithoutThemKeepsAll) {
   }
 }
 
+TEST(AttachedParts, WhatHalfOfTheFirstEightViewsShowIsNone) {
+  Random random;
+  AttachedParts parts;
+  for (int i = 0; i < 4; ++i) {
+    note_view(parts, bare_view(random));
+    const Features features = view_with_bonnet(random);
+    EXPECT_EQ(num_kept(parts, features), features.keypoints.size()) << i;
+    note_view(parts, features);
+  }
+  const Features features = view_with_bonnet(random);
+  EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
+}
+
 TEST(AttachedParts, ACameraThatStandsStillHasNone) {
   Random random;
   AttachedParts parts;

@@ -18,11 +18,12 @@ constexpr int kReach_px = 2;
 /// is attached.
 constexpr int kCells = 4;
 
-/// A spot is attached if half of the latest 16 views have a feature there; at the beginning of a
-/// run, half of those so far, but at least 4. By chance one of 600 features lies within 2 px of a
-/// spot in a view of 640 x 480 with a probability of 0.03, and in a crowded part of 0.15: in 8 of
-/// 16 views then with 0.001.
-constexpr int kMinSeen = 4;
+/// A spot is attached if so many of the latest views, at most 16, have a feature there: all of 4,
+/// 6 of 8, 8 of 16. By chance one of 600 features lies within 2 px of a spot in a view of 640 x 480
+/// with a probability of 0.03, and in a crowded part of 0.15: in so many views then with at most
+/// 0.0014, however many views there are.
+int least_seen(int num_views) { return (num_views + 10) / 3; }
+
 /// Beside a part, half of the latest 6 views are enough: when the light changes, other features of
 /// it come up.
 constexpr int kViewsBeside = 6;
@@ -180,7 +181,7 @@ void AttachedParts::find_parts(const std::vector<Keypoint>& keypoints) {
   const int views = std::min(num_views_, std::numeric_limits<Views>::digits);
   BinaryContent spots;
   for (const Keypoint& keypoint : keypoints) {
-    if (std::popcount(views_at(keypoint)) < std::max(kMinSeen, views / 2)) continue;
+    if (std::popcount(views_at(keypoint)) < least_seen(views)) continue;
     const cv::Point pixel = content_pixel(keypoint, size_px_);
     spots.rows[static_cast<std::size_t>(pixel.y)] |= column_bit(pixel);
   }
