@@ -131,6 +131,39 @@ TEST(AttachedParts, AreForgottenWhereTheyAreNoLongerSeen) {
   EXPECT_EQ(num_kept(parts, features), features.keypoints.size());
 }
 
+/// Keypoint k of one is keypoint k of the other, as far as both are alike.
+std::vector<Match> matches(std::size_t first, std::size_t last) {
+  std::vector<Match> matches;
+  for (std::size_t k = first; k < last; ++k) {
+    matches.push_back({static_cast<int>(k), static_cast<int>(k)});
+  }
+  return matches;
+}
+
+TEST(AttachedParts, MayBeAllThatTwoImagesShareUntilTheyAreKnown) {
+  Random random;
+  AttachedParts parts;
+  const Features place = view_with_bonnet(random);
+  const std::size_t end = place.keypoints.size();
+  for (int i = 0; i < 4; ++i) {
+    const Features query = view_with_bonnet(random);
+    EXPECT_TRUE(parts.may_be_all(query, place, matches(200, end))) << "the bonnet";
+    EXPECT_FALSE(parts.may_be_all(query, place, matches(0, 200))) << "what moves";
+    EXPECT_FALSE(parts.may_be_all(place, place, matches(0, end))) << "from the same place";
+    note_view(parts, query);
+  }
+  const Features query = view_with_bonnet(random);
+  EXPECT_FALSE(parts.may_be_all(query, place, matches(200, end))) << "would have been removed";
+}
+
+TEST(AttachedParts, OfAnotherCameraAreNotTheSame) {
+  Random random;
+  Features place = view_with_bonnet(random);
+  place.working_size_px.width += 1;
+  EXPECT_FALSE(AttachedParts().may_be_all(view_with_bonnet(random), place,
+                                          matches(200, place.keypoints.size())));
+}
+
 TEST(AttachedParts, AnotherWorkingSizeBeginsAnew) {
   Random random;
   AttachedParts parts;

@@ -5,11 +5,13 @@
 #include <initializer_list>
 #include <limits>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgproc.hpp>
 
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_tools.hpp"
@@ -386,6 +388,35 @@ TEST_F(MapSession, MatchesSupportEachOtherWithinASessionOnly) {
   EXPECT_EQ(two[4].earlier_match, (SessionFrame{2, 0}));
   EXPECT_LT(two[4].score, one[4].score);
   EXPECT_GT(two[8].score, two[4].score);
+}
+
+/// A bonnet in view does not make the first frames of two sessions one place.
+TEST_F(MapSession, ARobotInViewIsNoPlace) {
+  const auto view_over_bonnet = [](int place, const cv::Point& moved_px) {
+    cv::Mat1b image = view(place, moved_px);
+    const cv::Rect lowest(0, 3 * image.rows / 4, image.cols, image.rows / 4);
+    cv::resize(textured_image({2 * lowest.width, 2 * lowest.height}, 99), image(lowest),
+               lowest.size(), 0, 0, cv::INTER_AREA);
+    return image;
+  };
+  const auto drive_past = [&](const std::vector<int>& places, const cv::Point& moved_px) {
+    const auto map = std::make_shared<MapWriter>(path("map.db"), fast_options(), "drive");
+    LoopDetector detector(fast_options(), map);
+    std::vector<int> found;
+    for (const int place : places) {
+      const Detection detection = detector.process(view_over_bonnet(place, moved_px));
+      if (detection.status != Status::loop) continue;
+      EXPECT_EQ(detection.earlier_match, (SessionFrame{1, place}));
+      found.push_back(place);
+    }
+    map->finish();
+    return found;
+  };
+  std::vector<int> first(100);
+  std::iota(first.begin(), first.end(), 0);
+  drive_past(first, {0, 0});
+  EXPECT_EQ(drive_past({100, 101, 102, 103, 104, 8, 9, 10, 11}, {6, 2}),
+            (std::vector{8, 9, 10, 11}));
 }
 
 TEST_F(MapSession, RemovedPlacesStayRemoved) {

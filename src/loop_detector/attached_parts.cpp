@@ -17,6 +17,7 @@ constexpr int kReach_px = 2;
 /// cells or more, even in noise; one that moves repeats less than a fifth by chance, but for what
 /// is attached.
 constexpr int kCells = 4;
+constexpr std::size_t kNumCells = std::size_t{kCells} * kCells;
 
 /// A spot is attached if so many of the latest views, at most 16, have a feature there: all of 4,
 /// 6 of 8, 8 of 16. By chance one of 600 features lies within 2 px of a spot in a view of 640 x 480
@@ -45,6 +46,12 @@ cv::Point content_pixel(const Keypoint& keypoint, const cv::Size& size_px) {
     return std::clamp(pixel, 0, kContentSide - 1);
   };
   return {scaled(keypoint.x_px, size_px.width), scaled(keypoint.y_px, size_px.height)};
+}
+
+std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px) {
+  const cv::Point cell = content_pixel(keypoint, size_px) * kCells / kContentSide;
+  const int index = cell.y * kCells + cell.x;
+  return static_cast<std::size_t>(index);
 }
 
 std::uint64_t column_bit(const cv::Point& pixel) {
@@ -83,6 +90,10 @@ BinaryContent closed(const BinaryContent& content, int half_gap) {
 
 }  // namespace
 
+bool is_unmoved(const Keypoint& a, const Keypoint& b) {
+  return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px) <= static_cast<float>(kReach_px);
+}
+
 void AttachedParts::remove_from(BinaryContent& content) const {
   for (std::size_t y = 0; y < content.rows.size(); ++y) content.rows[y] &= ~parts_.rows[y];
 }
@@ -101,6 +112,25 @@ void AttachedParts::remove_from(Features& features) const {
   features.num_dark = kept_dark;
   features.keypoints.resize(kept);
   features.descriptors.resize(kept);
+}
+
+bool AttachedParts::may_be_all(const Features& query, const Features& place,
+                               const std::vector<Match>& inliers) const {
+  const cv::Size& size_px = query.working_size_px;
+  if (are_known(size_px) || place.working_size_px != size_px) return false;
+  std::array<bool, kNumCells> has_features{};
+  std::array<bool, kNumCells> has_unmoved{};
+  for (const Keypoint& keypoint : query.keypoints)
+    has_features.at(cell_of(keypoint, size_px)) = true;
+  std::size_t unmoved = 0;
+  for (const Match& match : inliers) {
+    const Keypoint& keypoint = query.keypoint(match.query);
+    if (!is_unmoved(keypoint, place.keypoint(match.place))) continue;
+    has_unmoved.at(cell_of(keypoint, size_px)) = true;
+    ++unmoved;
+  }
+  return 2 * unmoved > inliers.size() &&
+         2 * std::ranges::count(has_unmoved, true) < std::ranges::count(has_features, true);
 }
 
 void AttachedParts::reserve_next(const cv::Size& working_size_px) {
@@ -134,6 +164,11 @@ AttachedParts::Views AttachedParts::views_at(const Keypoint& keypoint) const {
   return views_[index_of(rounded(keypoint.x_px), rounded(keypoint.y_px))];
 }
 
+/// At the beginning of a run, no spot can have been seen often enough.
+bool AttachedParts::are_known(const cv::Size& size_px) const {
+  return size_px == size_px_ && num_views_ >= least_seen(num_views_);
+}
+
 bool AttachedParts::is_attached(const Keypoint& keypoint) const {
   const cv::Point pixel = content_pixel(keypoint, size_px_);
   if (is_set(parts_, pixel)) return true;
@@ -148,11 +183,9 @@ bool AttachedParts::shows_last_view(const std::vector<Keypoint>& keypoints) cons
     int features = 0;
     int unmoved = 0;
   };
-  std::array<Cell, std::size_t{kCells} * kCells> cells;
+  std::array<Cell, kNumCells> cells;
   for (const Keypoint& keypoint : keypoints) {
-    const cv::Point pixel = content_pixel(keypoint, size_px_) * kCells / kContentSide;
-    const int index = pixel.y * kCells + pixel.x;
-    Cell& cell = cells.at(static_cast<std::size_t>(index));
+    Cell& cell = cells.at(cell_of(keypoint, size_px_));
     ++cell.features;
     if ((std::rotr(views_at(keypoint), num_views_ - 1) & 1U) != 0) ++cell.unmoved;
   }

@@ -10,8 +10,13 @@
 
 #include "loopbit/binary_content.hpp"
 #include "loopbit/surf.hpp"
+#include "loopbit/verification.hpp"
 
 namespace loopbit {
+
+/// Whether a keypoint of one image is where it is in the other: on the robot itself, on dirt on the
+/// lens or its rim, far away, or seen from the same place.
+bool is_unmoved(const Keypoint& a, const Keypoint& b);
 
 /// What moves with the camera: the robot's bonnet or arm, dirt on the lens. It shows in every image
 /// and would make all places look alike, so contents and features leave it out. It is found where
@@ -20,6 +25,12 @@ class AttachedParts {
  public:
   void remove_from(BinaryContent& content) const;
   void remove_from(Features& features) const;
+
+  /// Whether parts that are not known yet may be all that two images share: most inliers stay where
+  /// they are, and they lie in less than half of the image. A camera that is where it was before
+  /// keeps all of the image in place.
+  [[nodiscard]] bool may_be_all(const Features& query, const Features& place,
+                                const std::vector<Match>& inliers) const;
 
   /// Takes the memory that the next remember() needs, so that it does not throw.
   void reserve_next(const cv::Size& working_size_px);
@@ -37,6 +48,7 @@ class AttachedParts {
   [[nodiscard]] Views views_at(const Keypoint& keypoint) const;
   [[nodiscard]] bool is_attached(const Keypoint& keypoint) const;
   [[nodiscard]] bool shows_last_view(const std::vector<Keypoint>& keypoints) const;
+  [[nodiscard]] bool are_known(const cv::Size& size_px) const;
   void note(const std::vector<Keypoint>& keypoints);
   void find_parts(const std::vector<Keypoint>& keypoints);
 

@@ -82,14 +82,11 @@ void check_whole(const Features& features) {
                   size_px.height));
 }
 
-/// Inliers that moved between two images. Those that did not may be the robot itself, dirt on the
-/// lens or its rim, which are in view for ever.
+/// Inliers that moved between two images. Those that did not may be the robot itself, which is in
+/// view for ever.
 int moved_inliers(const Features& query, const Features& place, const std::vector<Match>& inliers) {
-  constexpr float kMinMotion_px = 2.0F;
-  return static_cast<int>(std::count_if(inliers.begin(), inliers.end(), [&](const Match& match) {
-    const Keypoint& a = query.keypoint(match.query);
-    const Keypoint& b = place.keypoint(match.place);
-    return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px) > kMinMotion_px;
+  return static_cast<int>(std::ranges::count_if(inliers, [&](const Match& match) {
+    return !is_unmoved(query.keypoint(match.query), place.keypoint(match.place));
   }));
 }
 
@@ -172,6 +169,7 @@ class LoopDetector::Impl {
   /// The same for an observation whose content and features are known.
   Detection detect(const Given& given, Observation& seen) const {
     check_whole(seen.features);
+    seen.all_keypoints = seen.features.keypoints;
     Detection detection = unanswered(given);
     recognise(seen, {}, detection);
     return detection;
@@ -192,7 +190,7 @@ class LoopDetector::Impl {
     // Where the robot is sure to be back, half of them are rivals enough.
     const double revisit = 1 - prior.elsewhere();
     if (revisit >= options_.decision.min_score) candidates.resize((candidates.size() + 1) / 2);
-    const std::size_t num_similar = candidates.size();
+    std::size_t num_similar = candidates.size();
     candidates.insert(candidates.end(), seen.also_in_reach.begin(), seen.also_in_reach.end());
     add_expected(seen, prior, end, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
@@ -202,6 +200,7 @@ class LoopDetector::Impl {
     CandidateVerifier::Query query = verified_query(seen);
     if (!seen.too_far.empty()) query.may_match = seen.is_allowed;
     seen.verified = seen.work->candidates.verify(query, candidates, num_similar);
+    num_similar -= remove_alike_by_attached_parts(seen, num_similar);
     decide(seen, std::move(prior), num_similar, end, detection);
     report_unreachable(seen, end, detection);
     report_earlier_frames(seen, detection);
@@ -444,6 +443,21 @@ class LoopDetector::Impl {
     seen.all_keypoints = seen.features.keypoints;
     attached_parts_.remove_from(seen.content);
     attached_parts_.remove_from(seen.features);
+  }
+
+  /// Places recorded before their session's attached parts were known still show them. Returns how
+  /// many of the first `num_similar` candidates were removed.
+  std::size_t remove_alike_by_attached_parts(Observation& seen, std::size_t num_similar) const {
+    if (options_.decision.count_matches) return 0;
+    const auto is_alike = [&](const VerifiedCandidate& v) {
+      return v.geometry &&
+             attached_parts_.may_be_all(seen.features, features(v.candidate.place, seen),
+                                        v.geometry->inliers);
+    };
+    const auto end = seen.verified.begin() + static_cast<std::ptrdiff_t>(num_similar);
+    const auto removed = std::count_if(seen.verified.begin(), end, is_alike);
+    std::erase_if(seen.verified, is_alike);
+    return static_cast<std::size_t>(removed);
   }
 
   /// How far back the view of a new frame reaches.
