@@ -185,7 +185,7 @@ TEST(PathMotion, APathThatLastedIsLeftMoreSeldom) {
 }
 
 TEST(PathMotion, OneStepEarlierUndoesOneStepLater) {
-  Belief belief{{{100, 0.4, 0.1}, {200, 0.2, 0.0}}};
+  Belief belief{{{100, {0.3, 0.05, 0.05, 0.1}}, {200, {0.1, 0.1}}}};
   Belief prior = one_step_later(belief, 0.01);
   const Returns returns = returns_to({100, 101, 500, 100}, kSteps,
                                      [](std::ptrdiff_t step) { return step == 101 ? 0.5 : 1.0; });
@@ -197,15 +197,16 @@ TEST(PathMotion, OneStepEarlierUndoesOneStepLater) {
   // A frame that tells nothing leaves the past as it was.
   const Belief same = one_step_earlier(belief, prior, returns, prior);
   for (std::size_t i = 0; i < belief.places.size(); ++i) {
-    EXPECT_NEAR(same.places[i].forward, belief.places[i].forward, 1e-12);
-    EXPECT_NEAR(same.places[i].backward, belief.places[i].backward, 1e-12);
+    for (std::size_t m = 0; m < kNumMotions; ++m) {
+      EXPECT_NEAR(same.places[i].by_motion[m], belief.places[i].by_motion[m], 1e-12);
+    }
   }
   // The robot is sure to be at 102 now: it came from 100, forward, by two steps.
-  const Belief sure = one_step_earlier(belief, prior, returns, Belief{{{102, 1, 0}}});
-  EXPECT_GT(sure.places[0].forward, 0.99);
+  const Belief sure = one_step_earlier(belief, prior, returns, Belief{{{102, {1}}}});
+  EXPECT_GT(sure.places[0].by_motion[0], 0.99);
   EXPECT_LT(sure.at(200), 1e-3);
   // Or at 500, to which it can only have returned.
-  const Belief back = one_step_earlier(belief, prior, returns, Belief{{{500, 0.5, 0.5}}});
+  const Belief back = one_step_earlier(belief, prior, returns, Belief{{{500, {0.5, 0, 0, 0.5}}}});
   EXPECT_GT(back.elsewhere(), 0.9);
 }
 

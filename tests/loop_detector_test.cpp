@@ -661,7 +661,8 @@ TEST(LoopDetector, PassingAlongOneSceneIsNoLoopUntilItIsSeenAgain) {
   for (int frame = 0; frame < 10; ++frame) {
     const Detection detection = detector.process(passing_view(frame, {3, 5}));
     EXPECT_EQ(detection.status, Status::loop);
-    EXPECT_NEAR(detection.match.value_or(-100), frame, 1);
+    // Views beside each other share nearly all of the scene, and the pace is not known at first.
+    EXPECT_NEAR(detection.match.value_or(-100), frame, 2);
   }
 }
 

@@ -16,10 +16,36 @@ constexpr double kReturn = 1 / kUsualSteps;
 /// A hundred changes of view are 33 independent ones, as long as nothing is known. With more images
 /// of the same path, each has less to say, and the path ends at it more seldom.
 constexpr double kUsualIndependent = kUsualSteps / 3;
-/// A path is followed at 0, 1 or 2 steps per step, most likely at the speed of before.
-constexpr std::array<double, kMaxMove + 1> kMoves{0.25, 0.5, 0.25};
+
+constexpr std::ptrdiff_t kMaxMove = 4;
+
+/// How likely it is to move by 0, 1, 2 steps, and so on.
+using Moves = std::array<double, kMaxMove + 1>;
+
+struct Pace {
+  double share;  ///< of the robots that return
+  Moves moves;
+};
+
+/// Most robots keep the pace of before, or images come as often. One that drives at half of it or
+/// at three times as fast does so for long.
+constexpr std::array<Pace, kNumPaces> kPaces{
+    {{0.6, {0.25, 0.5, 0.25}}, {0.2, {0.5, 0.5}}, {0.2, {0, 0, 0.25, 0.5, 0.25}}}};
 /// Robots seldom turn round on a path.
 constexpr double kTurn = 0.01;
+/// As seldom, they take another pace.
+constexpr double kNewPace = 0.01;
+
+constexpr const Pace& pace_of(std::size_t motion) { return kPaces.at(motion % kNumPaces); }
+
+constexpr std::ptrdiff_t direction_of(std::size_t motion) { return motion < kNumPaces ? 1 : -1; }
+
+/// The probability that a robot goes on with motion `next`, if it stays on its path.
+constexpr double goes_on(std::size_t motion, std::size_t next) {
+  if (motion == next) return 1 - kTurn - kNewPace * (1 - pace_of(next).share);
+  if (direction_of(motion) == direction_of(next)) return kNewPace * pace_of(next).share;
+  return motion % kNumPaces == next % kNumPaces ? kTurn : 0;
+}
 
 /// The item of `step`, or the end. `items`: in the order of steps.
 template <typename Items>
@@ -36,19 +62,22 @@ class Ratios {
     const double elsewhere = prior.elsewhere();
     double away = 1;
     const double new_ratio = elsewhere > 0 ? later.elsewhere() / elsewhere : 0.0;
-    for (const Hypothesis& h : prior.places) ratios_.push_back({h.step, 0, 0});
+    for (const Hypothesis& h : prior.places) ratios_.push_back({h.step, {}});
     for (const Hypothesis& h : later.places) {
       const auto known = item_at(prior.places, h.step);
       if (known == prior.places.end()) continue;
       Hypothesis& ratio = ratios_[static_cast<std::size_t>(known - prior.places.begin())];
-      if (known->forward > 0) ratio.forward = h.forward / known->forward;
-      if (known->backward > 0) ratio.backward = h.backward / known->backward;
+      for (std::size_t m = 0; m < kNumMotions; ++m) {
+        if (known->by_motion[m] > 0) ratio.by_motion[m] = h.by_motion[m] / known->by_motion[m];
+      }
     }
     for (const auto& [step, probability] : returns) {
       const auto there = item_at(ratios_, step);
       if (there == ratios_.end()) continue;
       away -= 2 * probability;
-      away_ += probability * (there->forward + there->backward);
+      for (std::size_t m = 0; m < kNumMotions; ++m) {
+        away_ += probability * pace_of(m).share * there->by_motion[m];
+      }
     }
     away_ += away * new_ratio;
   }
@@ -62,7 +91,8 @@ class Ratios {
     std::array<Hypothesis, 2 * kMaxMove + 1> near{};
     auto found = std::ranges::lower_bound(ratios_, step - kMaxMove, {}, &Hypothesis::step);
     for (Hypothesis& h : near) {
-      h = {step - kMaxMove + (&h - near.data()), away_, away_};
+      h.step = step - kMaxMove + (&h - near.data());
+      h.by_motion.fill(away_);
       if (found != ratios_.end() && found->step == h.step) h = *found++;
     }
     return near;
@@ -128,17 +158,23 @@ double leave_probability(double independence, const Followed& followed) {
 Belief one_step_later(const Belief& belief, double leave) {
   std::map<std::ptrdiff_t, Hypothesis> next;
   for (const Hypothesis& h : belief.places) {
-    const double forward = (1 - leave) * ((1 - kTurn) * h.forward + kTurn * h.backward);
-    const double backward = (1 - leave) * ((1 - kTurn) * h.backward + kTurn * h.forward);
-    for (std::size_t moved = 0; moved < kMoves.size(); ++moved) {
-      const auto steps = static_cast<std::ptrdiff_t>(moved);
-      next[h.step + steps].forward += kMoves[moved] * forward;
-      next[h.step - steps].backward += kMoves[moved] * backward;
+    for (std::size_t m = 0; m < kNumMotions; ++m) {
+      double stays = 0;
+      for (std::size_t before = 0; before < kNumMotions; ++before) {
+        stays += goes_on(before, m) * h.by_motion[before];
+      }
+      if (stays == 0) continue;
+      for (std::ptrdiff_t moved = 0; moved <= kMaxMove; ++moved) {
+        const double probability = pace_of(m).moves[static_cast<std::size_t>(moved)];
+        if (probability == 0) continue;
+        Hypothesis& there = next[h.step + direction_of(m) * moved];
+        there.by_motion[m] += probability * (1 - leave) * stays;
+      }
     }
   }
   Belief later{.places = {}, .leave = leave};
   later.places.reserve(next.size());
-  for (const auto& [step, h] : next) later.places.push_back({step, h.forward, h.backward});
+  for (const auto& [step, h] : next) later.places.push_back({step, h.by_motion});
   return later;
 }
 
@@ -147,8 +183,7 @@ void add_returns(const Returns& returns, Belief& belief) {
   for (const auto& [step, probability] : returns) {
     const double share = probability * elsewhere;
     Hypothesis& at = hypothesis_at(belief.places, step);
-    at.forward += share;
-    at.backward += share;
+    for (std::size_t m = 0; m < kNumMotions; ++m) at.by_motion[m] += pace_of(m).share * share;
   }
 }
 
@@ -159,23 +194,23 @@ Belief one_step_earlier(const Belief& belief, const Belief& prior, const Returns
   double sum = belief.elsewhere() * ratios.away();
   for (Hypothesis& h : earlier.places) {
     const auto near = ratios.around(h.step);
-    double forward = 0;
-    double backward = 0;
-    for (std::size_t moved = 0; moved < kMoves.size(); ++moved) {
-      forward += kMoves[moved] * near[kMaxMove + moved].forward;
-      backward += kMoves[moved] * near[kMaxMove - moved].backward;
+    std::array<double, kNumMotions> after{};
+    for (std::size_t m = 0; m < kNumMotions; ++m) {
+      for (std::ptrdiff_t moved = 0; moved <= kMaxMove; ++moved) {
+        const auto there = static_cast<std::size_t>(kMaxMove + direction_of(m) * moved);
+        after[m] += pace_of(m).moves[static_cast<std::size_t>(moved)] * near[there].by_motion[m];
+      }
     }
-    const double turned = kTurn * (forward + backward);
-    const double left = prior.leave * ratios.away();
-    h.forward *= (1 - prior.leave) * ((1 - 2 * kTurn) * forward + turned) + left;
-    h.backward *= (1 - prior.leave) * ((1 - 2 * kTurn) * backward + turned) + left;
+    for (std::size_t m = 0; m < kNumMotions; ++m) {
+      double stays = 0;
+      for (std::size_t next = 0; next < kNumMotions; ++next)
+        stays += goes_on(m, next) * after[next];
+      h.by_motion[m] *= (1 - prior.leave) * stays + prior.leave * ratios.away();
+    }
     sum += h.probability();
   }
   if (sum <= 0) return {};
-  for (Hypothesis& h : earlier.places) {
-    h.forward /= sum;
-    h.backward /= sum;
-  }
+  for (Hypothesis& h : earlier.places) h.multiply(1 / sum);
   return earlier;
 }
 

@@ -2,20 +2,31 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
+#include <numeric>
 #include <optional>
 #include <vector>
 
 namespace loopbit {
 
-/// That the robot is at a step of the past, and moves along it forward or backward.
+/// A robot follows an earlier path at the pace of before, at a slower or at a faster one.
+inline constexpr std::size_t kNumPaces = 3;
+/// Forward at each pace, and then backward.
+inline constexpr std::size_t kNumMotions = 2 * kNumPaces;
+
+/// That the robot is at a step of the past, and moves along it.
 struct Hypothesis {
   std::ptrdiff_t step = 0;
-  double forward = 0;
-  double backward = 0;
+  std::array<double, kNumMotions> by_motion{};
 
-  [[nodiscard]] double probability() const { return forward + backward; }
+  [[nodiscard]] double probability() const {
+    return std::accumulate(by_motion.begin(), by_motion.end(), 0.0);
+  }
+  void multiply(double factor) {
+    for (double& probability : by_motion) probability *= factor;
+  }
 };
 
 /// A probability for each of a few steps, in their order; the rest is somewhere new.
@@ -44,11 +55,11 @@ double probability_at(const Returns& returns, std::ptrdiff_t step);
 /// The hypothesis of a step, which is inserted if there is none. `places`: in the order of steps.
 Hypothesis& hypothesis_at(std::vector<Hypothesis>& places, std::ptrdiff_t step);
 
-// How a robot moves: it follows an earlier path forward or backward at up to two steps per step,
-// turns round on it, leaves it, or returns anywhere. docs/method.md, section 4, has the model.
+// How a robot moves: it follows an earlier path forward or backward at some pace, turns round on
+// it, leaves it, or returns anywhere. docs/method.md, section 4, has the model.
 
-/// A path moves by so many steps per step, at most.
-inline constexpr std::ptrdiff_t kMaxMove = 2;
+/// At the pace of before, a path moves by so many steps per step, at most.
+inline constexpr std::ptrdiff_t kUsualMove = 2;
 
 /// `num_steps`: how many there are to return to. `steps`: those that were looked at.
 /// `weight(step)`: 0 to 1, how well the return agrees with odometry.

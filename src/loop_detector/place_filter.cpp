@@ -61,15 +61,14 @@ void share_among_laps(const KnownLoops& loops, std::vector<Hypothesis>& places) 
   for (const std::ptrdiff_t step : steps) {
     const auto first = loops.first_visit_of(step);
     if (!first) continue;
-    const Hypothesis other = hypothesis_at(places, *first);
+    hypothesis_at(places, *first);  // so that the next two are there already
     Hypothesis& here = hypothesis_at(places, step);
-    const double forward = kShareOfLaps * (other.forward - here.forward);
-    const double backward = kShareOfLaps * (other.backward - here.backward);
-    here.forward += forward;
-    here.backward += backward;
     Hypothesis& there = hypothesis_at(places, *first);
-    there.forward -= forward;
-    there.backward -= backward;
+    for (std::size_t m = 0; m < kNumMotions; ++m) {
+      const double shared = kShareOfLaps * (there.by_motion[m] - here.by_motion[m]);
+      here.by_motion[m] += shared;
+      there.by_motion[m] -= shared;
+    }
   }
 }
 
@@ -98,14 +97,10 @@ double weigh(const ByStep& ratios, Belief& belief) {
   for (Hypothesis& h : belief.places) {
     const auto found = find_step(ratios, h.step);
     const double ratio = found == ratios.end() ? 1.0 : std::exp(found->second);
-    h.forward *= ratio;
-    h.backward *= ratio;
+    h.multiply(ratio);
     sum += h.probability();
   }
-  for (Hypothesis& h : belief.places) {
-    h.forward /= sum;
-    h.backward /= sum;
-  }
+  for (Hypothesis& h : belief.places) h.multiply(1 / sum);
   elsewhere /= sum;
   std::erase_if(belief.places, [&](const Hypothesis& h) {
     const bool is_dropped = h.probability() < kMinProbability;

@@ -14,7 +14,7 @@ namespace {
 /// A path lasts for 32 steps, as for late loops.
 constexpr double kFading = 31.0 / 32.0;
 /// Places so close may follow the same place of the step before.
-constexpr std::ptrdiff_t kOnePath = 2 * kMaxMove;
+constexpr std::ptrdiff_t kOnePath = 2 * kUsualMove;
 
 /// Of `paths`, the indices of those that count. Places side by side show the same, which is one
 /// path: the one that is known longest counts.

@@ -60,7 +60,7 @@ auto next_to(const Items& items, std::ptrdiff_t step, const StepOf& step_of,
   for (auto at = items.begin(); at != items.end(); ++at) {
     const std::ptrdiff_t ahead = step_of(*at) - step;
     const std::ptrdiff_t move = ahead < 0 ? -ahead : ahead;
-    if (move < kMinMove || move > kMaxMove) continue;
+    if (move < kMinMove || move > kUsualMove) continue;
     if (best == items.end() || is_better(*at, *best)) best = at;
   }
   return best;
