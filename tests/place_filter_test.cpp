@@ -390,7 +390,7 @@ TEST(PlaceFilter, PrepareChangesNoAnswerBeforeCommit) {
 }
 
 TEST(PlaceFilter, LikeliestAreDifferentPathsInOrder) {
-  const Belief belief{{{10, 0.2, 0}, {14, 0.1, 0.05}, {40, 0, 0.3}, {90, 0.001, 0}}};
+  const Belief belief{{{10, {0.2}}, {14, {0.1, 0.05}}, {40, {0, 0.3}}, {90, {0.001}}}};
   EXPECT_EQ(PlaceFilter::likeliest(belief, 0.01, 5), (std::vector<std::ptrdiff_t>{40, 10}));
   EXPECT_EQ(PlaceFilter::likeliest(belief, 0.0, 5), (std::vector<std::ptrdiff_t>{40, 10, 90}));
   EXPECT_EQ(PlaceFilter::likeliest(belief, 0.0, 1), (std::vector<std::ptrdiff_t>{40}));
