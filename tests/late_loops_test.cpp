@@ -169,7 +169,7 @@ TEST(LateLoops, ItLooksBackABoundedWay) {
 }
 
 TEST(PathMotion, APathEndsMoreSeldomWhereEachStepCountsLess) {
-  const Belief belief{{{100, 0.6, 0.4}}};
+  const Belief belief{{{100, {0.6, 0, 0, 0.4}}}};
   for (const auto& [independence, leave] : {std::pair{1.0, 0.01}, {0.5, 0.01}, {0.1, 0.003}}) {
     const Belief later = one_step_later(belief, leave_probability(independence, {}));
     EXPECT_NEAR(later.leave, leave, 1e-12) << independence;
