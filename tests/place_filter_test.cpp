@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <numeric>
 #include <random>
 #include <utility>
 #include <vector>
@@ -58,7 +59,7 @@ TEST(PlaceFilter, APathIsFollowedAtHalfThePaceAndAtThreeTimes) {
   EXPECT_GT(fast.follow(100, 3, 20, kAtDusk).probability, 0.98);
   FilterRobot slow;
   PlaceFilter::Update update;
-  for (int i = 0; i < 30; ++i) update = slow.see({{100 + i / 2, kAtDusk}});
+  for (int i = 0; i < 30; ++i) update = slow.see({{100 + i / 2, {.votes = 16}}});
   EXPECT_GT(update.probability, 0.98);
 }
 

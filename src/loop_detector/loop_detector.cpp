@@ -169,7 +169,7 @@ class LoopDetector::Impl {
   /// The same for an observation whose content and features are known.
   Detection detect(const Given& given, Observation& seen) const {
     check_whole(seen.features);
-    seen.all_keypoints = seen.features.keypoints;
+    seen.all_keypoints = seen.features.keypoints;  // which tell how many views there were
     Detection detection = unanswered(given);
     recognise(seen, {}, detection);
     return detection;
