@@ -329,6 +329,32 @@ TEST(LoopDetector, NothingIsFoundUnderAMaskInRealImages) {
   EXPECT_GT(num_features, std::size_t{84} * 100);
 }
 
+/// A place behind something that travels along and moves in the image.
+cv::Mat1b view_behind_companion(int place, const cv::Point& moved_px, Random& random) {
+  cv::Mat1b image = view(place, moved_px);
+  const cv::Rect at(random.between(80, 110), random.between(70, 100), 120, 110);
+  cv::resize(textured_image(at.size() * 2, 1000), image(at), at.size(), 0, 0, cv::INTER_AREA);
+  return image;
+}
+
+TEST(LoopDetector, FindsLoopsBehindACompanion) {
+  LoopDetector detector(fast_options());
+  Random random;
+  constexpr int kPlaces = 100;
+  for (int place = 0; place < kPlaces; ++place) {
+    const Detection detection = detector.process(view_behind_companion(place, {0, 0}, random));
+    EXPECT_NE(detection.status, Status::loop) << place;
+  }
+  int loops = 0;
+  for (int place = 0; place < kPlaces - 20; ++place) {
+    const Detection detection = detector.process(view_behind_companion(place, {6, 2}, random));
+    if (detection.status != Status::loop) continue;
+    EXPECT_EQ(detection.match, place);
+    ++loops;
+  }
+  EXPECT_GE(loops, kPlaces / 2);
+}
+
 TEST(LoopDetector, AMaskThatExcludesNothingChangesNothing) {
   const std::vector<cv::Mat1b> images = two_laps();
   LoopDetector plain(fast_options());

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <functional>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -103,6 +104,55 @@ TEST(RecentView, MarginIsAtMostThirtySteps) {
     view.remember(newest, look);
   }
   EXPECT_EQ(begin, 999 - reach - 30);
+}
+
+/// A drive with a companion in view, which is left out if the frame `shows` it.
+std::vector<RecentView::Look> drive_with_companion(int frames,
+                                                   const std::function<bool(PlaceId)>& shows) {
+  RecentView view;
+  std::vector<RecentView::Look> looks;
+  for (PlaceId newest = 0; newest < frames; ++newest) {
+    const bool is_left_out = view.long_in_view().has_value() && shows(newest);
+    looks.push_back(view.look(
+        newest, true,
+        [&](PlaceId place) { return newest - place <= kSightM || (!is_left_out && shows(newest)); },
+        is_left_out));
+    view.remember(newest, looks.back());
+    EXPECT_TRUE(view.is_in_view(static_cast<PlaceId>(looks.back().companion_step)));
+  }
+  return looks;
+}
+
+TEST(RecentView, ACompanionIsNoView) {
+  const auto looks = drive_with_companion(300, [](PlaceId /*newest*/) { return true; });
+  for (std::size_t i = 0; i <= 64; ++i) EXPECT_EQ(looks[i].begin, 0) << i;
+  // The far end moves on by two steps a step, until the scene is in view.
+  for (std::size_t i = 130; i < looks.size(); ++i) {
+    EXPECT_EQ(looks[i].begin, static_cast<PlaceId>(i) - 2 * kSightM);
+    EXPECT_EQ(looks[i].companion_step, 0U);
+  }
+}
+
+TEST(RecentView, WhereACompanionIsNotSeenAllSinceThenIsRecent) {
+  const auto looks = drive_with_companion(300, [](PlaceId newest) { return newest != 200; });
+  EXPECT_EQ(looks[199].begin, 199 - 2 * kSightM);
+  EXPECT_EQ(looks[200].begin, 0);
+  EXPECT_EQ(looks[201].begin, 201 - 2 * kSightM);
+}
+
+TEST(RecentView, ACompanionThatLeavesIsForgotten) {
+  const auto looks = drive_with_companion(500, [](PlaceId newest) { return newest < 200; });
+  EXPECT_EQ(looks.back().begin, 499 - 2 * kSightM);
+  EXPECT_EQ(looks.back().companion_step, looks.back().far_step);
+}
+
+TEST(RecentView, WhatCannotBeLeftOutStaysInView) {
+  RecentView view;
+  for (PlaceId newest = 0; newest < 300; ++newest) {
+    const auto look = view.look(newest, true, [](PlaceId /*place*/) { return true; });
+    EXPECT_EQ(look.begin, 0);
+    view.remember(newest, look);
+  }
 }
 
 TEST(RecentView, StandingStillDoesNotMoveTheBegin) {

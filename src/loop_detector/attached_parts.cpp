@@ -3,22 +3,17 @@
 #include "attached_parts.hpp"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 
+#include "image_parts.hpp"
+
 namespace loopbit {
 namespace {
 
 constexpr int kReach_px = 2;
-/// The image in 4 x 4 cells: a camera that stands still repeats a third of the features of most
-/// cells or more, even in noise; one that moves repeats less than a fifth by chance, but for what
-/// is attached.
-constexpr int kCells = 4;
-constexpr std::size_t kNumCells = std::size_t{kCells} * kCells;
-
 /// A spot is attached if so many of the latest views, at most 16, have a feature there: all of 4,
 /// 6 of 8, 8 of 16. By chance one of 600 features lies within 2 px of a spot in a view of 640 x 480
 /// with a probability of 0.03, and in a crowded part of 0.15: in so many views then with at most
@@ -30,62 +25,11 @@ int least_seen(int num_views) { return (num_views + 10) / 3; }
 constexpr int kViewsBeside = 6;
 /// Fewer spots are distant things that a straight path keeps in place.
 constexpr int kMinSpots = 16;
-/// Gaps of up to twice as many content pixels between attached spots belong to the part, too.
-constexpr int kHalfGap_px = 3;
 constexpr int kBeside_px = 6;
 
 /// As std::lround(), which is a call, for x >= 0: a double has bits enough for the sum.
 int rounded(float x) {
   return static_cast<int>(static_cast<double>(x) + 0.5);  // NOLINT(bugprone-incorrect-roundings)
-}
-
-/// The pixel of a content that shows a keypoint.
-cv::Point content_pixel(const Keypoint& keypoint, const cv::Size& size_px) {
-  const auto scaled = [](float x, int side) {
-    const auto pixel = static_cast<int>(x * kContentSide / static_cast<float>(side));
-    return std::clamp(pixel, 0, kContentSide - 1);
-  };
-  return {scaled(keypoint.x_px, size_px.width), scaled(keypoint.y_px, size_px.height)};
-}
-
-std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px) {
-  const cv::Point cell = content_pixel(keypoint, size_px) * kCells / kContentSide;
-  const int index = cell.y * kCells + cell.x;
-  return static_cast<std::size_t>(index);
-}
-
-std::uint64_t column_bit(const cv::Point& pixel) {
-  return std::uint64_t{1} << static_cast<unsigned>(pixel.x);
-}
-
-bool is_set(const BinaryContent& content, const cv::Point& pixel) {
-  return (content.rows[static_cast<std::size_t>(pixel.y)] & column_bit(pixel)) != 0;
-}
-
-/// With all pixels at most `reach` rows and columns away.
-BinaryContent dilated(BinaryContent content, int reach) {
-  for (int i = 0; i < reach; ++i) {
-    BinaryContent wide;
-    for (std::size_t y = 0; y < content.rows.size(); ++y) {
-      const std::uint64_t row = content.rows[y];
-      const std::uint64_t wide_row = row | row << 1U | row >> 1U;
-      wide.rows[y] |= wide_row;
-      if (y > 0) wide.rows[y - 1] |= wide_row;
-      if (y + 1 < content.rows.size()) wide.rows[y + 1] |= wide_row;
-    }
-    content = wide;
-  }
-  return content;
-}
-
-BinaryContent inverted(BinaryContent content) {
-  for (std::uint64_t& row : content.rows) row = ~row;
-  return content;
-}
-
-/// With the gaps of up to 2 * half_gap rows and columns.
-BinaryContent closed(const BinaryContent& content, int half_gap) {
-  return inverted(dilated(inverted(dilated(content, half_gap)), half_gap));
 }
 
 }  // namespace
@@ -94,32 +38,19 @@ bool is_unmoved(const Keypoint& a, const Keypoint& b) {
   return std::hypot(b.x_px - a.x_px, b.y_px - a.y_px) <= static_cast<float>(kReach_px);
 }
 
-void AttachedParts::remove_from(BinaryContent& content) const {
-  for (std::size_t y = 0; y < content.rows.size(); ++y) content.rows[y] &= ~parts_.rows[y];
-}
+void AttachedParts::remove_from(BinaryContent& content) const { clear(content, parts_); }
 
 void AttachedParts::remove_from(Features& features) const {
   if (features.working_size_px != size_px_) return;
-  std::size_t kept = 0;
-  std::size_t kept_dark = 0;
-  for (std::size_t i = 0; i < features.keypoints.size(); ++i) {
-    if (is_attached(features.keypoints[i])) continue;
-    if (i < features.num_dark) ++kept_dark;
-    features.keypoints[kept] = features.keypoints[i];
-    features.descriptors[kept] = features.descriptors[i];
-    ++kept;
-  }
-  features.num_dark = kept_dark;
-  features.keypoints.resize(kept);
-  features.descriptors.resize(kept);
+  remove_features(features, [this](const Keypoint& keypoint) { return is_attached(keypoint); });
 }
 
 bool AttachedParts::may_be_all(const Features& query, const Features& place,
                                const std::vector<Match>& inliers) const {
   const cv::Size& size_px = query.working_size_px;
   if (are_known(size_px) || place.working_size_px != size_px) return false;
-  std::array<bool, kNumCells> has_features{};
-  std::array<bool, kNumCells> has_unmoved{};
+  PerCell<bool> has_features{};
+  PerCell<bool> has_unmoved{};
   for (const Keypoint& keypoint : query.keypoints)
     has_features.at(cell_of(keypoint, size_px)) = true;
   std::size_t unmoved = 0;
@@ -183,12 +114,14 @@ bool AttachedParts::shows_last_view(const std::vector<Keypoint>& keypoints) cons
     int features = 0;
     int unmoved = 0;
   };
-  std::array<Cell, kNumCells> cells;
+  PerCell<Cell> cells;
   for (const Keypoint& keypoint : keypoints) {
     Cell& cell = cells.at(cell_of(keypoint, size_px_));
     ++cell.features;
     if ((std::rotr(views_at(keypoint), num_views_ - 1) & 1U) != 0) ++cell.unmoved;
   }
+  // A camera that stands still repeats a third of the features of most cells or more, even in
+  // noise; one that moves repeats less than a fifth by chance, but for what is attached.
   const auto seen =
       std::count_if(cells.begin(), cells.end(), [](const Cell& cell) { return cell.features > 0; });
   const auto unmoved = std::count_if(cells.begin(), cells.end(), [](const Cell& cell) {
@@ -215,11 +148,10 @@ void AttachedParts::find_parts(const std::vector<Keypoint>& keypoints) {
   BinaryContent spots;
   for (const Keypoint& keypoint : keypoints) {
     if (std::popcount(views_at(keypoint)) < least_seen(views)) continue;
-    const cv::Point pixel = content_pixel(keypoint, size_px_);
-    spots.rows[static_cast<std::size_t>(pixel.y)] |= column_bit(pixel);
+    set(spots, content_pixel(keypoint, size_px_));
   }
   if (count(spots) < kMinSpots) spots = {};
-  parts_ = closed(spots, kHalfGap_px);
+  parts_ = closed(spots);
   beside_ = dilated(spots, kBeside_px);
 }
 

@@ -18,6 +18,8 @@
 
 #include "attached_parts.hpp"
 #include "candidate_filter.hpp"
+#include "companion.hpp"
+#include "image_parts.hpp"
 #include "late_loops.hpp"
 #include "place_filter.hpp"
 #include "places.hpp"
@@ -82,12 +84,16 @@ void check_whole(const Features& features) {
                   size_px.height));
 }
 
-/// Inliers that moved between two images. Those that did not may be the robot itself, which is in
-/// view for ever.
-int moved_inliers(const Features& query, const Features& place, const std::vector<Match>& inliers) {
-  return static_cast<int>(std::ranges::count_if(inliers, [&](const Match& match) {
-    return !is_unmoved(query.keypoint(match.query), place.keypoint(match.place));
-  }));
+/// The query's keypoints among inliers that moved between two images. Those that did not may be the
+/// robot itself, which is in view for ever.
+std::vector<Keypoint> moved_keypoints(const Features& query, const Features& place,
+                                      const std::vector<Match>& inliers) {
+  std::vector<Keypoint> moved;
+  for (const Match& match : inliers) {
+    const Keypoint& keypoint = query.keypoint(match.query);
+    if (!is_unmoved(keypoint, place.keypoint(match.place))) moved.push_back(keypoint);
+  }
+  return moved;
 }
 
 /// Of a keypoint in its image, 0 to 1.
@@ -462,14 +468,43 @@ class LoopDetector::Impl {
 
   /// How far back the view of a new frame reaches.
   [[nodiscard]] RecentView::Look look(Observation& seen) const {
+    const RecentView& view = places_.recent_view();
+    const auto oldest = view.long_in_view();
+    const bool is_companion_left_out = oldest && leave_out_companion(seen, *oldest);
     const bool is_step = places_.changes_view(seen.content);
-    return places_.recent_view().look(places_.size(), is_step, [&](PlaceId place) {
-      // A fixed window does not depend on the view, of which only the latest step is needed.
-      if (is_window_fixed()) return false;
-      const Verification& shared = compare(seen, place);
-      return moved_inliers(seen.features, features(place, seen), shared.inliers) >=
-             options_.exclusion.in_view_inliers;
+    return view.look(
+        places_.size(), is_step,
+        [&](PlaceId place) {
+          // A fixed window does not depend on the view, of which only the latest step is needed.
+          return !is_window_fixed() && is_in_view(shared_with(seen, place));
+        },
+        is_companion_left_out);
+  }
+
+  [[nodiscard]] bool is_in_view(const std::vector<Keypoint>& shared) const {
+    return std::ssize(shared) >= options_.exclusion.in_view_inliers;
+  }
+
+  /// The frame's keypoints that a recent place shows, too, elsewhere in the image.
+  [[nodiscard]] std::vector<Keypoint> shared_with(Observation& seen, PlaceId place) const {
+    const Verification& shared = compare(seen, place);
+    return moved_keypoints(seen.features, features(place, seen), shared.inliers);
+  }
+
+  /// Leaves out what the frame shares with a place that was in view long ago, unless that is most
+  /// of the image. Returns whether there is such a thing.
+  bool leave_out_companion(Observation& seen, PlaceId place) const {
+    if (is_window_fixed() || options_.decision.count_matches) return false;
+    const std::vector<Keypoint> shared = shared_with(seen, place);
+    if (!is_in_view(shared)) return false;
+    const BinaryContent pixels = companion_pixels(seen.features, shared);
+    if (count(pixels) == 0) return false;
+    clear(seen.content, pixels);
+    remove_features(seen.features, [&](const Keypoint& keypoint) {
+      return is_set(pixels, content_pixel(keypoint, seen.features.working_size_px));
     });
+    seen.compared = -1;
+    return true;
   }
 
   /// See inlier_worth(). A frame that shows the same as the last step can recognise as much.

@@ -1,0 +1,69 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "image_parts.hpp"
+
+#include <cstdint>
+
+namespace loopbit {
+namespace {
+
+/// Gaps of up to twice as many content pixels belong to a part.
+constexpr int kHalfGap_px = 3;
+
+std::uint64_t column_bit(const cv::Point& pixel) {
+  return std::uint64_t{1} << static_cast<unsigned>(pixel.x);
+}
+
+BinaryContent inverted(BinaryContent content) {
+  for (std::uint64_t& row : content.rows) row = ~row;
+  return content;
+}
+
+}  // namespace
+
+cv::Point content_pixel(const Keypoint& keypoint, const cv::Size& size_px) {
+  const auto scaled = [](float x, int side) {
+    const auto pixel = static_cast<int>(x * kContentSide / static_cast<float>(side));
+    return std::clamp(pixel, 0, kContentSide - 1);
+  };
+  return {scaled(keypoint.x_px, size_px.width), scaled(keypoint.y_px, size_px.height)};
+}
+
+bool is_set(const BinaryContent& content, const cv::Point& pixel) {
+  return (content.rows[static_cast<std::size_t>(pixel.y)] & column_bit(pixel)) != 0;
+}
+
+void set(BinaryContent& content, const cv::Point& pixel) {
+  content.rows[static_cast<std::size_t>(pixel.y)] |= column_bit(pixel);
+}
+
+void clear(BinaryContent& content, const BinaryContent& pixels) {
+  for (std::size_t y = 0; y < content.rows.size(); ++y) content.rows[y] &= ~pixels.rows[y];
+}
+
+BinaryContent dilated(BinaryContent content, int reach) {
+  for (int i = 0; i < reach; ++i) {
+    BinaryContent wide;
+    for (std::size_t y = 0; y < content.rows.size(); ++y) {
+      const std::uint64_t row = content.rows[y];
+      const std::uint64_t wide_row = row | row << 1U | row >> 1U;
+      wide.rows[y] |= wide_row;
+      if (y > 0) wide.rows[y - 1] |= wide_row;
+      if (y + 1 < content.rows.size()) wide.rows[y + 1] |= wide_row;
+    }
+    content = wide;
+  }
+  return content;
+}
+
+BinaryContent closed(const BinaryContent& content) {
+  return inverted(dilated(inverted(dilated(content, kHalfGap_px)), kHalfGap_px));
+}
+
+std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px) {
+  const cv::Point cell = content_pixel(keypoint, size_px) * kCellsPerSide / kContentSide;
+  const int index = cell.y * kCellsPerSide + cell.x;
+  return static_cast<std::size_t>(index);
+}
+
+}  // namespace loopbit
