@@ -128,16 +128,16 @@ TEST(RecentView, ACompanionIsNoView) {
   for (std::size_t i = 0; i <= 64; ++i) EXPECT_EQ(looks[i].begin, 0) << i;
   // The far end moves on by two steps a step, until the scene is in view.
   for (std::size_t i = 130; i < looks.size(); ++i) {
-    EXPECT_EQ(looks[i].begin, static_cast<PlaceId>(i) - 2 * kSightM);
+    EXPECT_EQ(looks[i].begin, static_cast<PlaceId>(i) - kSightM - 30);
     EXPECT_EQ(looks[i].companion_step, 0U);
   }
 }
 
 TEST(RecentView, WhereACompanionIsNotSeenAllSinceThenIsRecent) {
   const auto looks = drive_with_companion(300, [](PlaceId newest) { return newest != 200; });
-  EXPECT_EQ(looks[199].begin, 199 - 2 * kSightM);
+  EXPECT_EQ(looks[199].begin, 199 - kSightM - 30);
   EXPECT_EQ(looks[200].begin, 0);
-  EXPECT_EQ(looks[201].begin, 201 - 2 * kSightM);
+  EXPECT_EQ(looks[201].begin, 201 - kSightM - 30);
 }
 
 TEST(RecentView, ACompanionThatLeavesIsForgotten) {

@@ -40,8 +40,10 @@ RecentView::Look RecentView::look(PlaceId newest, bool is_step,
     look.far_step = std::max(far_step_, look.companion_step);
   }
   const std::size_t end = is_companion_left_out ? look.far_step : look.companion_step;
-  const std::size_t reach = steps_.size() - end;
-  const std::size_t begin = end - std::min({reach, kMaxMarginSteps, end});
+  // Without the features of a companion, the reach is less certain.
+  const std::size_t margin =
+      is_companion_left_out ? kMaxMarginSteps : std::min(steps_.size() - end, kMaxMarginSteps);
+  const std::size_t begin = end - std::min(margin, end);
   look.begin = begin < steps_.size() ? steps_[begin] : newest;
   return look;
 }
