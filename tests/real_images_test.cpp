@@ -126,7 +126,7 @@ std::vector<DecisionCounts> score_with_robots(const std::string& name, const std
   for (const double height : {0.15, 0.2, 0.25}) {
     for (const double width : {0.5, 1.0}) {
       const std::string title = fmt::format("{}, robot {} x {}", name, width, height);
-      counts.push_back(score(title, input, truth, attached(Robot{wall(), width, height})));
+      counts.push_back(score(title, input, truth, attached({wall(), width, height})));
     }
   }
   return counts;

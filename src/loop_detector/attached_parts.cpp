@@ -14,6 +14,7 @@ namespace loopbit {
 namespace {
 
 constexpr int kReach_px = 2;
+
 /// A spot is attached if so many of the latest views, at most 16, have a feature there: all of 4,
 /// 6 of 8, 8 of 16. By chance one of 600 features lies within 2 px of a spot in a view of 640 x 480
 /// with a probability of 0.03, and in a crowded part of 0.15: in so many views then with at most
@@ -49,19 +50,12 @@ bool AttachedParts::may_be_all(const Features& query, const Features& place,
                                const std::vector<Match>& inliers) const {
   const cv::Size& size_px = query.working_size_px;
   if (are_known(size_px) || place.working_size_px != size_px) return false;
-  PerCell<bool> has_features{};
-  PerCell<bool> has_unmoved{};
-  for (const Keypoint& keypoint : query.keypoints)
-    has_features.at(cell_of(keypoint, size_px)) = true;
-  std::size_t unmoved = 0;
+  std::vector<Keypoint> unmoved;
   for (const Match& match : inliers) {
     const Keypoint& keypoint = query.keypoint(match.query);
-    if (!is_unmoved(keypoint, place.keypoint(match.place))) continue;
-    has_unmoved.at(cell_of(keypoint, size_px)) = true;
-    ++unmoved;
+    if (is_unmoved(keypoint, place.keypoint(match.place))) unmoved.push_back(keypoint);
   }
-  return 2 * unmoved > inliers.size() &&
-         2 * std::ranges::count(has_unmoved, true) < std::ranges::count(has_features, true);
+  return 2 * unmoved.size() > inliers.size() && is_lesser_part(unmoved, query);
 }
 
 void AttachedParts::reserve_next(const cv::Size& working_size_px) {

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "companion.hpp"
 
-#include <algorithm>
-
 #include "image_parts.hpp"
 
 namespace loopbit {
@@ -16,18 +14,11 @@ constexpr int kEdge_px = 2;
 }  // namespace
 
 BinaryContent companion_pixels(const Features& image, const std::vector<Keypoint>& shared) {
-  const cv::Size& size_px = image.working_size_px;
-  PerCell<bool> has_features{};
-  PerCell<bool> has_shared{};
+  if (!is_lesser_part(shared, image)) return {};
   BinaryContent pixels;
-  for (const Keypoint& keypoint : image.keypoints)
-    has_features.at(cell_of(keypoint, size_px)) = true;
   for (const Keypoint& keypoint : shared) {
-    has_shared.at(cell_of(keypoint, size_px)) = true;
-    set(pixels, content_pixel(keypoint, size_px));
+    set(pixels, content_pixel(keypoint, image.working_size_px));
   }
-  const auto num_shared = std::ranges::count(has_shared, true);
-  if (2 * num_shared >= std::ranges::count(has_features, true)) return {};
   return dilated(closed(pixels), kEdge_px);
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "image_parts.hpp"
 
+#include <algorithm>
 #include <cstdint>
 
 namespace loopbit {
@@ -64,6 +65,17 @@ std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px) {
   const cv::Point cell = content_pixel(keypoint, size_px) * kCellsPerSide / kContentSide;
   const int index = cell.y * kCellsPerSide + cell.x;
   return static_cast<std::size_t>(index);
+}
+
+bool is_lesser_part(const std::vector<Keypoint>& part, const Features& image) {
+  const auto num_cells = [&](const std::vector<Keypoint>& keypoints) {
+    PerCell<bool> has_any{};
+    for (const Keypoint& keypoint : keypoints) {
+      has_any.at(cell_of(keypoint, image.working_size_px)) = true;
+    }
+    return std::ranges::count(has_any, true);
+  };
+  return 2 * num_cells(part) < num_cells(image.keypoints);
 }
 
 }  // namespace loopbit

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <vector>
 
 #include <opencv2/core.hpp>
 
@@ -31,6 +31,9 @@ inline constexpr int kCellsPerSide = 4;
 template <typename Value>
 using PerCell = std::array<Value, std::size_t{kCellsPerSide} * kCellsPerSide>;
 std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px);
+
+/// Whether keypoints of an image lie in less than half of the cells that have features.
+bool is_lesser_part(const std::vector<Keypoint>& part, const Features& image);
 
 /// Removes the features whose keypoint `is_unwanted`.
 template <typename IsUnwanted>

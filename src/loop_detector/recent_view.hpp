@@ -40,7 +40,7 @@ class RecentView {
 
   /// `newest`: the number of the new frame. `is_step`: it differs from latest_step() in looks.
   /// `in_view(place)`: it shares geometry with that place; asked at most twice.
-  /// `is_companion_left_out`: what it shares with long_in_view().
+  /// `is_companion_left_out`: what it shares with long_in_view() was left out of it before.
   [[nodiscard]] Look look(PlaceId newest, bool is_step, const std::function<bool(PlaceId)>& in_view,
                           bool is_companion_left_out = false) const;
 
