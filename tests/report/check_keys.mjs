@@ -121,6 +121,7 @@ export async function checkTable(page) {
   assert.equal(await shownFrame(page), 0, "a key for the table walks, too");
   await page.waitForFunction((element) => element.scrollLeft > 0, await table.elementHandle());
   await page.setViewportSize(kWide);
+  await settled(page);
   await table.focus();
   await page.keyboard.press("ArrowRight");
   assert.equal(await shownFrame(page), 1, "a table that shows all of itself takes keys");
