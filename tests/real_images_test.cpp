@@ -139,6 +139,15 @@ TEST(RealImages, CorridorWalkedTwice) {
   EXPECT_GE(counts.recall(), 0.97);
 }
 
+TEST(RealImages, CorridorInFog) {
+  LOOPBIT_NEEDS_DATA("corridor_loop");
+  const auto counts =
+      score("corridor_loop, 0.15 of the contrast", "corridor_loop/images", corridor_truth(),
+            [](cv::Mat& image) { gray_image(image).convertTo(image, CV_8U, 0.15, 60); });
+  EXPECT_EQ(counts.wrong, 0);
+  EXPECT_GE(counts.recall(), 0.9);
+}
+
 TEST(RealImages, ARobotInViewIsNoPlace) {
   LOOPBIT_NEEDS_DATA("corridor_loop");
   LOOPBIT_NEEDS_DATA("graf");

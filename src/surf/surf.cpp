@@ -24,8 +24,9 @@
 namespace loopbit {
 namespace {
 
-/// In squared grey levels: below, the 8 bits of a pixel are too coarse to tell a blob.
-constexpr float kMinResponse = 1.0F;
+/// In squared grey levels: twenty times what rounding pixels to whole grey levels makes of a flat
+/// area, in the smallest filters that find blobs (15 x 15 px). Foggy or dark images have no more.
+constexpr float kMinResponse = 0.01F;
 /// Down to this factor, linear interpolation takes every pixel into account; it is much faster than
 /// averaging areas.
 constexpr double kLeastLinearFactor = 0.5;
