@@ -119,10 +119,14 @@ class Runner:
             else:
                 print(f"{name}: left out, there is no {self.data / images}", file=sys.stderr)
 
+    def real_command(self, name):
+        """The command that runs a real sequence with its truth."""
+        return ["run", self.data / REAL[name][0], *self.truth_flags(name)]
+
     def sequences(self):
         """Yields a name and the command that runs it with its truth."""
         for name in self.real():
-            yield name, ["run", self.data / REAL[name][0], *self.truth_flags(name)]
+            yield name, self.real_command(name)
         for name, settings in WORLDS.items():
             yield name, world_command(settings)
 
