@@ -59,6 +59,7 @@ struct FilterRobot {
   std::function<double(std::ptrdiff_t)> return_weight = [](std::ptrdiff_t) { return 1.0; };
   std::function<bool(std::ptrdiff_t)> may_match = [](std::ptrdiff_t) { return true; };
   std::size_t num_similar = kSimilar;
+  std::vector<int> votes_just_left;
   int frame = 0;
   LateLoops::Found changed;  ///< by the latest frame
 
@@ -76,7 +77,11 @@ struct FilterRobot {
 
   [[nodiscard]] PlaceFilter::Update look(const FoundAt& found, bool is_step = true) const {
     return filter.update(filter.predict(is_step), candidates(found), num_similar,
-                         {kSteps, may_be_at, return_weight}, loops);
+                         {.number = kSteps,
+                          .may_be_at = may_be_at,
+                          .return_weight = return_weight,
+                          .votes_just_left = votes_just_left},
+                         loops);
   }
 
   PlaceFilter::Update see(const FoundAt& found, bool is_step = true) {

@@ -82,7 +82,7 @@ TEST(LateLoops, ALoopWhoseTwinWinsIsWithdrawn) {
   Walk walk;
   const int first = walk.robot.frame;
   // The way from 3000 looks much like that from 100, until it is seen by itself.
-  for (int i = 0; i < 14; ++i) walk.see({{100 + i, {.votes = 26}}, {3000 + i, {.votes = 20}}});
+  for (int i = 0; i < 14; ++i) walk.see({{100 + i, {.votes = 28}}, {3000 + i, {.votes = 20}}});
   ASSERT_TRUE(walk.at_once.contains(first + 8));
   ASSERT_TRUE(walk.late.contains(first + 4));
   EXPECT_TRUE(walk.withdrawn.empty());

@@ -139,6 +139,25 @@ TEST(RealImages, CorridorWalkedTwice) {
   EXPECT_GE(counts.recall(), 0.97);
 }
 
+TEST(RealImages, ACorridorAfterACampusIsNoRevisit) {
+  LOOPBIT_NEEDS_DATA("corridor_loop");
+  LOOPBIT_NEEDS_DATA("gardens_point");
+  constexpr int kFirstWalk = 40;
+  LoopDetector detector;
+  const auto walk = [&](const std::string& images, int most) {
+    const auto source = open_source((*test::data_dir() / images).string());
+    int loops = 0;
+    Frame frame;
+    for (int i = 0; i < most && source->next(frame); ++i) {
+      if (detector.process(frame.image).status == Status::loop) ++loops;
+    }
+    return loops;
+  };
+  EXPECT_EQ(walk("gardens_point/day_left", 200), 0);
+  EXPECT_EQ(walk("corridor_loop/images", kFirstWalk), 0)
+      << "its walls look more like each other than like the campus";
+}
+
 TEST(RealImages, CorridorInFog) {
   LOOPBIT_NEEDS_DATA("corridor_loop");
   const auto counts =

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -48,6 +49,9 @@ constexpr std::size_t kFollowedPaths = 3;
 constexpr double kMinFollowedProbability = 2e-3;
 /// On each, the places up to so many steps away.
 constexpr std::ptrdiff_t kFollowedReach = 2;
+/// Places that the robot has just left show what is common to its surroundings: so many of them are
+/// looked at, the first that left the view.
+constexpr std::ptrdiff_t kPlacesJustLeft = 2;
 /// With odometry, so many times as many places are looked up, up to kMaxCandidates: those of other
 /// storeys may look more alike than the one where the robot is.
 constexpr int kLookAlikes = 10;
@@ -139,6 +143,7 @@ class LoopDetector::Impl {
     PlaceId compared = -1;                 ///< the recent place that `work` compares it with
     std::vector<VerifiedCandidate> verified;
     std::optional<VerifiedCandidate> best;  ///< of them
+    std::vector<int> votes_just_left;       ///< see PlaceFilter::Steps
     bool closely = false;                   ///< see CandidateVerifier::Query
     PlaceFilter::Update update;
     LateLoops::Found changed;  ///< loops of earlier frames
@@ -199,13 +204,19 @@ class LoopDetector::Impl {
     std::size_t num_similar = candidates.size();
     candidates.insert(candidates.end(), seen.also_in_reach.begin(), seen.also_in_reach.end());
     add_expected(seen, prior, end, candidates);
+    const std::size_t num_candidates = candidates.size();
+    add_just_left(seen, end, candidates);
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that features, geometry and the frames before agree on.
     seen.closely = revisit >= kWorthACloserLook;
     CandidateVerifier::Query query = verified_query(seen);
-    if (!seen.too_far.empty()) query.may_match = seen.is_allowed;
+    query.may_match = [&](PlaceId place) { return is_candidate(place, end, seen); };
     seen.verified = seen.work->candidates.verify(query, candidates, num_similar);
+    for (const VerifiedCandidate& v : std::span(seen.verified).subspan(num_candidates)) {
+      seen.votes_just_left.push_back(v.votes.count);
+    }
+    seen.verified.resize(num_candidates);
     num_similar -= remove_alike_by_attached_parts(seen, num_similar);
     decide(seen, std::move(prior), num_similar, end, detection);
     report_unreachable(seen, end, detection);
@@ -646,6 +657,18 @@ class LoopDetector::Impl {
     }
   }
 
+  /// The oldest places of the exclusion window that are out of view.
+  void add_just_left(const Observation& seen, PlaceId end,
+                     std::vector<Candidate>& candidates) const {
+    if (options_.decision.count_matches || places_.recent_view().empty()) return;
+    const auto in_view = static_cast<std::ptrdiff_t>(seen.look.far_step);
+    const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, places_.step_of(end));
+    for (std::ptrdiff_t step = first; step < std::min(first + kPlacesJustLeft, in_view); ++step) {
+      const auto place = places_.place_of(step);
+      if (place && *place >= end) candidates.push_back(candidate(*place, seen.content));
+    }
+  }
+
   void decide(Observation& seen, Belief prior, std::size_t num_similar, PlaceId end,
               Detection& detection) const {
     const DecisionOptions& decision = options_.decision;
@@ -666,7 +689,8 @@ class LoopDetector::Impl {
               const auto place = seen.reach ? places_.place_of(step) : std::nullopt;
               return place ? Reach::weight(chi2(*seen.reach, *place, end)) : 1.0;
             },
-        .is_step = seen.look.is_step};
+        .is_step = seen.look.is_step,
+        .votes_just_left = seen.votes_just_left};
     seen.update = place_filter_.update(std::move(prior), seen.verified, num_similar, steps,
                                        places_.known_loops());
     if (!seen.update.match) return;

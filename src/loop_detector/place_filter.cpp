@@ -249,10 +249,12 @@ std::vector<std::ptrdiff_t> PlaceFilter::likeliest(const Belief& belief, double 
   return steps;
 }
 
-/// Votes in standard deviations from what equally similar places have, less what this place shows
-/// other frames.
+/// Votes in standard deviations from what similar places and those just left have, less what this
+/// place shows other frames. `just_left`: with what the frame shows of them, if there is a null.
 std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>& verified,
-                                            std::size_t num_similar) const {
+                                            std::size_t num_similar,
+                                            const std::vector<int>& votes_just_left,
+                                            JustLeft& just_left) const {
   std::vector<double> sigmas(verified.size(), 0.0);
   if (num_similar < kMinNull) return sigmas;
   std::vector<double> null;
@@ -261,8 +263,12 @@ std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>
     null.push_back(stabilized(verified[i].votes.count));
   }
   const auto votes_null = VotesNull::by_medians(std::move(null));
+  std::vector<double> left;
+  left.reserve(votes_just_left.size());
+  for (const int votes : votes_just_left) left.push_back(clamped_sigmas(votes_null.sigmas(votes)));
+  just_left = just_left_.with(left);
   for (std::size_t i = 0; i < verified.size(); ++i) {
-    const double z = votes_null.sigmas(verified[i].votes.count);
+    const double z = just_left.beyond(votes_null.sigmas(verified[i].votes.count));
     sigmas[i] = clamped_sigmas(z - mean_shown(verified[i].step));
   }
   return sigmas;
@@ -271,7 +277,8 @@ std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>
 /// The more alike a wrong place looks from one step to the next, the less the inliers of each
 /// count.
 double PlaceFilter::geometry_independence() const {
-  const double correlation = std::clamp(same_path_products_ / same_path_squares_, 0.0, 0.95);
+  const double correlation =
+      std::clamp(same_path_products_.value() / same_path_squares_.value(), 0.0, 0.95);
   return std::min(1.0, kGeometryIndependence * (1 - correlation) / (1 + correlation));
 }
 
@@ -308,15 +315,15 @@ double PlaceFilter::probability_alone(const CandidateGeometry& geometry,
   return 1 / (1 + std::exp(-ratio) / from_anywhere(num_steps));
 }
 
-std::vector<PlaceFilter::Observed> PlaceFilter::observe(
-    const std::vector<VerifiedCandidate>& verified, std::size_t num_similar, const Steps& known,
-    const KnownLoops& loops) const {
-  const std::vector<double> sigmas = deviations(verified, num_similar);
+void PlaceFilter::observe(const std::vector<VerifiedCandidate>& verified, std::size_t num_similar,
+                          const Steps& known, const KnownLoops& loops, Update& update) const {
+  update.just_left = just_left_;
+  const std::vector<double> sigmas =
+      deviations(verified, num_similar, known.votes_just_left, update.just_left);
   const auto steady =
       steady_.look(verified, num_similar, known.is_step,
                    [&](std::ptrdiff_t a, std::ptrdiff_t b) { return is_near(a, b, loops); });
-  std::vector<Observed> observed;
-  observed.reserve(verified.size());
+  update.observed.reserve(verified.size());
   for (std::size_t i = 0; i < verified.size(); ++i) {
     Observed o{.candidate = verified[i].candidate,
                .step = verified[i].step,
@@ -329,9 +336,8 @@ std::vector<PlaceFilter::Observed> PlaceFilter::observe(
       o.excess = verified[i].geometry->excess();
       o.geometry = geometry_log_ratio(*verified[i].geometry, known.number);
     }
-    observed.push_back(o);
+    update.observed.push_back(o);
   }
-  return observed;
 }
 
 PlaceFilter::Update PlaceFilter::update(Belief prior,
@@ -339,7 +345,7 @@ PlaceFilter::Update PlaceFilter::update(Belief prior,
                                         std::size_t num_similar, const Steps& known,
                                         const KnownLoops& loops) const {
   Update update;
-  update.observed = observe(verified, num_similar, known, loops);
+  observe(verified, num_similar, known, loops, update);
   update.has_null = num_similar >= kMinNull;
   std::erase_if(prior.places, [&](const Hypothesis& h) { return !known.may_be_at(h.step); });
   std::vector<std::ptrdiff_t> steps;
@@ -369,6 +375,7 @@ PlaceFilter::Next PlaceFilter::prepare(Update update, bool is_step, const KnownL
   Next next{.tail = tail_, .is_step = is_step};
   if (is_step) {
     learn(update, loops, next);
+    next.just_left = update.just_left;
     for (const auto& [step, sigmas] : next.sigmas) shown_.try_emplace(step);
     next.before = std::move(update.prior);
     next.followed = followed_until(update.belief);
@@ -439,6 +446,7 @@ void PlaceFilter::commit(Next next) noexcept {
   followed_ = next.followed;
   before_ = std::move(next.before);
   tail_ = next.tail;
+  just_left_ = next.just_left;
   steady_.commit(std::move(next.steady));
   if (!next.has_null) return;
   for (std::size_t i = 0; i < next.sigmas.size(); ++i) {
@@ -448,8 +456,8 @@ void PlaceFilter::commit(Next next) noexcept {
   }
   latest_sigmas_ = std::move(next.sigmas);
   votes_.commit(std::move(next.votes));
-  same_path_products_ += next.products;
-  same_path_squares_ += next.squares;
+  same_path_products_.add(next.products);
+  same_path_squares_.add(next.squares);
 }
 
 /// Of the frames of other places that were compared with the step, drawn towards 0 while they are

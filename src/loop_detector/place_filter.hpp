@@ -14,6 +14,7 @@
 #include "known_loops.hpp"
 #include "path_motion.hpp"
 #include "steady_displacements.hpp"
+#include "votes_ratio.hpp"
 #include "wrong_paths.hpp"
 
 namespace loopbit {
@@ -53,6 +54,7 @@ class PlaceFilter {
     Belief belief;    ///< after it
     Returns returns;  ///< of the prior
     std::vector<Observed> observed;
+    JustLeft just_left;  ///< with what the frame shows of them
     /// Index of the candidate that shows the same place best, if any was observed there.
     std::optional<std::size_t> match;
     bool has_null = false;   ///< there were places enough to tell what votes mean
@@ -91,12 +93,13 @@ class PlaceFilter {
   static std::vector<std::ptrdiff_t> likeliest(const Belief& belief, double min_probability,
                                                std::size_t most);
 
-  /// What is known of steps before the frame is seen.
+  /// What is known besides the candidates.
   struct Steps {
     std::ptrdiff_t number = 0;                            ///< of those that may be candidates
     std::function<bool(std::ptrdiff_t)> may_be_at;        ///< false for those that are excluded
     std::function<double(std::ptrdiff_t)> return_weight;  ///< see returns_to()
     bool is_step = true;                                  ///< see predict()
+    std::vector<int> votes_just_left = {};                ///< of places that the robot just left
   };
 
   /// `verified`: the candidates of the frame; the first `num_similar` look most alike.
@@ -116,6 +119,7 @@ class PlaceFilter {
     std::vector<double> shown = {};  ///< what is added for each of `sigmas`
     WrongPaths::Next votes = {};
     SteadyDisplacements::Next steady = {};
+    JustLeft just_left = {};
     Tail tail = {};
     Followed followed = {};
     double products = 0;
@@ -140,11 +144,12 @@ class PlaceFilter {
     int count = 0;
   };
 
-  [[nodiscard]] std::vector<Observed> observe(const std::vector<VerifiedCandidate>& verified,
-                                              std::size_t num_similar, const Steps& known,
-                                              const KnownLoops& loops) const;
+  void observe(const std::vector<VerifiedCandidate>& verified, std::size_t num_similar,
+               const Steps& known, const KnownLoops& loops, Update& update) const;
   [[nodiscard]] std::vector<double> deviations(const std::vector<VerifiedCandidate>& verified,
-                                               std::size_t num_similar) const;
+                                               std::size_t num_similar,
+                                               const std::vector<int>& votes_just_left,
+                                               JustLeft& just_left) const;
   [[nodiscard]] double mean_shown(std::ptrdiff_t step) const;
   [[nodiscard]] double geometry_independence() const;
   [[nodiscard]] double votes_log_ratio(
@@ -163,12 +168,13 @@ class PlaceFilter {
   std::unordered_map<std::ptrdiff_t, Shown> shown_;  ///< by step
   WrongPaths votes_;                                 ///< their deviations
   SteadyDisplacements steady_;
+  JustLeft just_left_;
   /// Prior: one frame in 11 has any, and ten frames had one each.
   Tail tail_{.seen = 1, .unseen = 10, .excess = 10, .count = 10};
-  /// Sums of the products of successive deviations along paths of wrong places, and of squares.
-  /// Prior: a correlation of 1/2.
-  double same_path_products_ = 100;
-  double same_path_squares_ = 200;
+  /// Of the products of successive deviations along paths of wrong places, and of squares. Prior: a
+  /// correlation of 1/2.
+  FadingSum same_path_products_{100};
+  FadingSum same_path_squares_{200};
 };
 
 }  // namespace loopbit

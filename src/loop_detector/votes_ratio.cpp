@@ -16,6 +16,10 @@ constexpr double kMinDeviation = 0.5;
 constexpr double kDeviationsPerMedian = 1.4826;  // of a normal distribution
 constexpr double kMinSigmas = -3;
 constexpr double kMaxSigmas = 12;
+/// Surroundings may be others within some four steps.
+constexpr double kSameSurroundings = 0.75;
+/// As if so many places just left had shown what similar ones do.
+constexpr double kJustLeftPrior = 3;
 /// A true place stands out by some three deviations on average, which is what a frame at night
 /// shows; one by day shows more.
 constexpr double kMeanSigmas = 3;
@@ -54,6 +58,24 @@ VotesNull::VotesNull(double middle, double deviation)
     : middle_(middle), deviation_(std::max(kMinDeviation, deviation)) {}
 
 double clamped_sigmas(double sigmas) { return std::clamp(sigmas, kMinSigmas, kMaxSigmas); }
+
+JustLeft JustLeft::with(std::span<const double> sigmas) const {
+  JustLeft next;
+  next.count_ = kSameSurroundings * count_;
+  next.sum_ = kSameSurroundings * sum_;
+  next.sum_sq_ = kSameSurroundings * sum_sq_;
+  for (const double of_place : sigmas) {
+    next.count_ += 1;
+    next.sum_ += of_place;
+    next.sum_sq_ += of_place * of_place;
+  }
+  const double number = next.count_ + kJustLeftPrior;
+  const double mean = next.sum_ / number;
+  const double squares = next.sum_sq_ - 2 * mean * next.sum_ + next.count_ * mean * mean;
+  next.mean_ = std::max(0.0, mean);
+  next.deviation_ = std::max(1.0, std::sqrt((kJustLeftPrior + squares) / number));
+  return next;
+}
 
 VotesRatio::VotesRatio(std::size_t num_null)
     : degrees_(static_cast<double>(std::min(kMaxDegrees, num_null - 1))),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 namespace loopbit {
@@ -36,6 +37,25 @@ class VotesNull {
 
 /// Within what one frame may say.
 double clamped_sigmas(double sigmas);
+
+/// What the places that the robot has just left show its frames. It is surely elsewhere now, but
+/// its surroundings are the same, and those of similar places need not be: a corridor looks more
+/// like itself than like the street that led there.
+class JustLeft {
+ public:
+  /// With the `sigmas` of such places in one more frame; what was known before fades.
+  [[nodiscard]] JustLeft with(std::span<const double> sigmas) const;
+
+  /// How far `sigmas` stand out, where these surroundings show more than similar places do.
+  [[nodiscard]] double beyond(double sigmas) const { return (sigmas - mean_) / deviation_; }
+
+ private:
+  double count_ = 0;
+  double sum_ = 0;
+  double sum_sq_ = 0;
+  double mean_ = 0;
+  double deviation_ = 1;
+};
 
 /// How much likelier the right place stands out from wrong ones by so many deviations than another
 /// wrong one.

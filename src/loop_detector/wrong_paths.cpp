@@ -35,7 +35,9 @@ std::vector<std::size_t> one_of_each(const std::vector<WrongPaths::Path>& paths)
 
 }  // namespace
 
-double WrongPaths::independence() const { return std::min(1.0, square_sums_ / sum_sq_); }
+double WrongPaths::independence() const {
+  return std::min(1.0, square_sums_.value() / sum_sq_.value());
+}
 
 WrongPaths::Next WrongPaths::prepare(const ByStep& wrong) const {
   Next next;
@@ -62,8 +64,8 @@ WrongPaths::Next WrongPaths::prepare(const ByStep& wrong) const {
 
 void WrongPaths::commit(Next next) noexcept {
   paths_ = std::move(next.paths);
-  sum_sq_ += next.sum_sq;
-  square_sums_ += next.square_sums;
+  sum_sq_.add(next.sum_sq);
+  square_sums_.add(next.square_sums);
 }
 
 }  // namespace loopbit

@@ -13,6 +13,25 @@ namespace loopbit {
 /// A value of each step, in the order of the steps.
 using ByStep = std::vector<std::pair<std::ptrdiff_t, double>>;
 
+/// A sum of what each step adds. Older steps fade, because surroundings change: what a campus
+/// showed says little of the building behind it.
+class FadingSum {
+ public:
+  /// `prior`: as long as nothing is known.
+  explicit FadingSum(double prior) : prior_(prior), value_(prior) {}
+
+  [[nodiscard]] double value() const { return value_; }
+  /// What a step adds.
+  void add(double more) noexcept { value_ += more - (value_ - prior_) / kSteps; }
+
+ private:
+  /// A step counts for so many steps on average.
+  static constexpr double kSteps = 200;
+
+  double prior_;
+  double value_;
+};
+
 /// How long the deviations of wrong places last along a path, measured on this map. A street that
 /// looks like another one does so for many steps, and these are not as many independent witnesses.
 /// The more often a camera takes an image, the more steps a street has, and the less each counts.
@@ -45,8 +64,8 @@ class WrongPaths {
 
  private:
   std::vector<Path> paths_;  ///< that end at the latest step
-  double sum_sq_ = 300;      ///< of `sum`; as if one step in three were independent
-  double square_sums_ = 100;
+  FadingSum sum_sq_{300};    ///< of `sum`; as if one step in three were independent
+  FadingSum square_sums_{100};
 };
 
 /// Of `items`, the best by `is_better(a, b)` of those whose step, `step_of(item)`, comes before or
