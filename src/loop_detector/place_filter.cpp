@@ -250,7 +250,8 @@ std::vector<std::ptrdiff_t> PlaceFilter::likeliest(const Belief& belief, double 
 }
 
 /// Votes in standard deviations from what similar places and those just left have, less what this
-/// place shows other frames. `just_left`: with what the frame shows of them, if there is a null.
+/// place shows other frames. If there is a null, sets `just_left` to what is known of the latter
+/// after this frame.
 std::vector<double> PlaceFilter::deviations(const std::vector<VerifiedCandidate>& verified,
                                             std::size_t num_similar,
                                             const std::vector<int>& votes_just_left,

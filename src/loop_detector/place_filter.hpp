@@ -25,9 +25,9 @@ namespace loopbit {
 ///
 /// Emission: what a candidate shows, displacement votes and geometry, as a likelihood ratio of "the
 /// same place" against "another place". Both nulls are measured on this map: votes against what
-/// equally similar places show this frame and what this place shows other frames, inliers against
-/// what the best wrong places showed so far. Transition: the robot follows an earlier path forward
-/// or backward at up to four steps per step, leaves it, or returns anywhere.
+/// similar places and those just left show this frame and what this place shows other frames,
+/// inliers against what the best wrong places showed so far. Transition: the robot follows an
+/// earlier path forward or backward at up to four steps per step, leaves it, or returns anywhere.
 ///
 /// Only places that were looked at gain probability, so cost and memory of a frame do not grow with
 /// the map.
