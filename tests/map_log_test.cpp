@@ -1,10 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
 // A map's log belongs to one file, and a file has one writer, whatever their names.
+#include <chrono>
 #include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -307,6 +309,25 @@ TEST_F(MapLog, AHeaderThatForbidsWritingIsDamage) {
     add_session(mended, 2);
     remove_database(damaged);
   }
+}
+
+/// As when a run ends while its live page reads a picture.
+TEST_F(MapLog, IsClosedAsSoonAsTheLastReaderIsGone) {
+  const std::string file = path("evidence.db");
+  const Database writer(file, Database::Access::create, {});
+  writer.execute("PRAGMA journal_mode = WAL; CREATE TABLE frame (frame INTEGER PRIMARY KEY)");
+  auto reader = std::make_unique<Database>(file, Database::Access::read, Database::Remedies{});
+  EXPECT_EQ(reader->integer("SELECT count(*) FROM frame"), 0);
+  constexpr const char* kClose = "PRAGMA journal_mode = DELETE";
+  expect_error(ErrorKind::output, {file, "another program holds it"},
+               [&] { writer.execute(kClose); });
+  std::thread leaves([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    reader.reset();
+  });
+  EXPECT_NO_THROW(writer.execute_alone(kClose));
+  leaves.join();
+  EXPECT_FALSE(fs::exists(file + "-wal"));
 }
 
 }  // namespace

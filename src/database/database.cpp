@@ -79,6 +79,16 @@ void Database::execute(const std::string& sql) const {
   if (sqlite3_exec(handle(), sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) fail();
 }
 
+void Database::execute_alone(const std::string& sql) const {
+  constexpr int kPause_ms = 10;
+  for (int waited_ms = 0;; waited_ms += kPause_ms) {
+    const int result = sqlite3_exec(handle(), sql.c_str(), nullptr, nullptr, nullptr);
+    if (result == SQLITE_OK) return;
+    if (result != SQLITE_BUSY || waited_ms >= kBusyTimeout_ms) fail();
+    sqlite3_sleep(kPause_ms);
+  }
+}
+
 std::int64_t Database::integer(const std::string& sql) const {
   Statement statement(*this, sql);
   return statement.step() ? statement.integer(0) : 0;

@@ -94,10 +94,11 @@ class EvidenceWriter::Impl {
     return stored;
   }
 
-  /// Readers that may not write need a file without a log beside it.
+  /// Readers that may not write need a file without a log beside it. A live page may be reading a
+  /// picture.
   void finish() {
     save();
-    database_.execute("PRAGMA journal_mode = DELETE");
+    database_.execute_alone("PRAGMA journal_mode = DELETE");
   }
 
  private:

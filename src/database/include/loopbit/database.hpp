@@ -51,6 +51,8 @@ class Database {
 
   /// Runs statements that give no rows.
   void execute(const std::string& sql) const;
+  /// The same where nobody else may have the file open, for which SQLite does not wait by itself.
+  void execute_alone(const std::string& sql) const;
 
   /// The first column of the first row of what `sql` gives; 0 where there is none.
   [[nodiscard]] std::int64_t integer(const std::string& sql) const;
