@@ -50,7 +50,7 @@ constexpr double kMinFollowedProbability = 2e-3;
 /// On each, the places up to so many steps away.
 constexpr std::ptrdiff_t kFollowedReach = 2;
 /// Places that the robot has just left show what is common to its surroundings: so many of them are
-/// looked at, the first that left the view.
+/// looked at.
 constexpr std::ptrdiff_t kPlacesJustLeft = 2;
 /// With odometry, so many times as many places are looked up, up to kMaxCandidates: those of other
 /// storeys may look more alike than the one where the robot is.

@@ -94,8 +94,8 @@ class EvidenceWriter::Impl {
     return stored;
   }
 
-  /// Readers that may not write need a file without a log beside it. A live page may be reading a
-  /// picture.
+  /// Readers that may not write need a file without a log beside it. Waits for a live page that
+  /// reads a picture.
   void finish() {
     save();
     database_.execute_alone("PRAGMA journal_mode = DELETE");
