@@ -4,7 +4,6 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
-#include <iostream>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -22,6 +21,7 @@
 #endif
 #include "loopbit/map_server.hpp"
 #include "loopbit/version.hpp"
+#include "loopbit/write_file.hpp"
 
 #include "commands.hpp"
 #include "process.hpp"
@@ -128,9 +128,11 @@ int run_command_line(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    std::ostringstream printed;
     std::ostringstream told;
     std::string line;
-    const int code = app.exit(error, std::cout, told);
+    const int code = app.exit(error, printed, told);
+    fmt::print("{}", printed.str());
     for (std::istringstream lines(told.str()); std::getline(lines, line);) {
       cli::tell(loopbit::without_secrets(line) + '\n');
     }
@@ -144,8 +146,9 @@ int run_and_flush(int argc, char** argv) {
   int exit_code = cli::success;
   try {
     exit_code = run_command_line(argc, argv);
-  } catch (const std::system_error&) {  // from fmt::print
+  } catch (const std::system_error& error) {  // from fmt::print
     if (std::ferror(stdout) == 0) throw;
+    throw loopbit::cannot_write("standard output", error.code().value());
   }
   cli::flush_stdout();
   return exit_code;
