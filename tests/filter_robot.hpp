@@ -57,6 +57,7 @@ struct FilterRobot {
   KnownLoops loops;
   std::function<bool(std::ptrdiff_t)> may_be_at = [](std::ptrdiff_t) { return true; };
   std::function<double(std::ptrdiff_t)> return_weight = [](std::ptrdiff_t) { return 1.0; };
+  AgreementOfMove agreement = {};
   std::function<bool(std::ptrdiff_t)> may_match = [](std::ptrdiff_t) { return true; };
   std::size_t num_similar = kSimilar;
   std::vector<int> votes_just_left;
@@ -76,7 +77,7 @@ struct FilterRobot {
   }
 
   [[nodiscard]] PlaceFilter::Update look(const FoundAt& found, bool is_step = true) const {
-    return filter.update(filter.predict(is_step), candidates(found), num_similar,
+    return filter.update(filter.predict(is_step, agreement), candidates(found), num_similar,
                          {.number = kSteps,
                           .may_be_at = may_be_at,
                           .return_weight = return_weight,

@@ -3,7 +3,9 @@
 #include "late_loops.hpp"
 
 #include <cstddef>
+#include <cstdlib>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -184,9 +186,32 @@ TEST(PathMotion, APathThatLastedIsLeftMoreSeldom) {
               1e-12);
 }
 
-TEST(PathMotion, OneStepEarlierUndoesOneStepLater) {
+/// That the robot moved by two steps of every path. Nothing is known of those before step 200.
+std::optional<double> by_two(std::ptrdiff_t from, std::ptrdiff_t to) {
+  if (from < 200) return std::nullopt;
+  return std::abs(to - from) == 2 ? 1.0 : 0.0;
+}
+
+TEST(PathMotion, OdometryTellsHowFar) {
+  const Belief belief{{{100, {0.4}}, {200, {0.2, 0, 0, 0.2}}}};
+  const Belief later = one_step_later(belief, 0.01, by_two);
+  EXPECT_NEAR(later.elsewhere(), 0.2 + 0.8 * 0.01, 1e-12) << "it goes on along each path";
+  EXPECT_EQ(later.at(101), one_step_later(belief, 0.01).at(101));
+  // Odometry fails as often as a robot takes another pace or turns round, which is once in 100.
+  EXPECT_GT(later.at(202), 0.95 * 0.2);
+  EXPECT_GT(later.at(198), 0.95 * 0.2);
+  EXPECT_GT(later.at(201), 0);
+  EXPECT_LT(later.at(201), 0.01);
+}
+
+class OneStepEarlier : public testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(PathMotion, OneStepEarlier, testing::Bool(), [](const auto& odometry) {
+  return odometry.param ? "WithOdometry" : "Without";
+});
+
+TEST_P(OneStepEarlier, UndoesOneStepLater) {
   Belief belief{{{100, {0.3, 0.05, 0.05, 0.1}}, {200, {0.1, 0.1}}}};
-  Belief prior = one_step_later(belief, 0.01);
+  Belief prior = one_step_later(belief, 0.01, GetParam() ? by_two : AgreementOfMove());
   const Returns returns = returns_to({100, 101, 500, 100}, kSteps,
                                      [](std::ptrdiff_t step) { return step == 101 ? 0.5 : 1.0; });
   ASSERT_EQ(returns.size(), 3U);

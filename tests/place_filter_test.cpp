@@ -307,6 +307,29 @@ TEST(PlaceFilter, OdometryTellsTwinsApart) {
   EXPECT_GE(update.probability, robot.min_score);
 }
 
+TEST(PlaceFilter, OdometryTellsWhichStepComesNext) {
+  // The robot stops and goes, and sees too little to be sure of where it is.
+  const auto drive = [](bool with_odometry) {
+    constexpr Found kLittle{.votes = 16};
+    FilterRobot robot;
+    std::ptrdiff_t step = 100;
+    double sum = 0;
+    for (int i = 0; i < 24; ++i) {
+      const std::ptrdiff_t moved = i % 2 == 0 ? 0 : 4;
+      if (with_odometry) {
+        robot.agreement = [moved](std::ptrdiff_t from, std::ptrdiff_t to) {
+          return std::abs(to - from) == moved ? 1.0 : 0.01;
+        };
+      }
+      step += moved;
+      sum += robot.see({{step, kLittle}}).probability;
+    }
+    return sum / 24;
+  };
+  EXPECT_GT(drive(true), 0.4);
+  EXPECT_LT(drive(false), 0.1);
+}
+
 TEST(PlaceFilter, GeometryOfASmallMapSaysLess) {
   const FilterRobot robot;
   const auto term_among = [&](std::ptrdiff_t steps) {

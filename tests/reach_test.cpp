@@ -208,6 +208,19 @@ TEST(DetectorReach, LoopsMakeItNarrower) {
   EXPECT_EQ(loops_above(0), 0);
 }
 
+TEST(DetectorOdometry, TheSameMotionAsOnThePathSpeaksForIt) {
+  // All is in reach. By odometry, the second lap goes as the first one, or stands still.
+  const auto path_term = [](bool moves) {
+    const auto detections = two_laps([moves](int frame) {
+      return camera_at(0, 0, 0.1 * (moves || frame < 40 ? frame % 40 : 20));
+    });
+    const Detection& second_loop = detections[41];
+    EXPECT_EQ(second_loop.match, 1);
+    return second_loop.terms ? second_loop.terms->path : 0;
+  };
+  EXPECT_GT(path_term(true), path_term(false) + 0.5);
+}
+
 TEST(DetectorReach, APlaceOutOfReachIsNoLoop) {
   const auto without = two_laps([](int) { return std::nullopt; });
   ASSERT_GT(count(without, Status::loop), 20);

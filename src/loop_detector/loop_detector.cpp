@@ -22,6 +22,7 @@
 #include "companion.hpp"
 #include "image_parts.hpp"
 #include "late_loops.hpp"
+#include "move_agreement.hpp"
 #include "place_filter.hpp"
 #include "places.hpp"
 #include "reach.hpp"
@@ -197,7 +198,7 @@ class LoopDetector::Impl {
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
     auto candidates = similar_places(detection, end, seen);
-    Belief prior = place_filter_.predict(seen.look.is_step);
+    Belief prior = place_filter_.predict(seen.look.is_step, agreement_of_moves(detection));
     // Where the robot is sure to be back, half of them are rivals enough.
     const double revisit = 1 - prior.elsewhere();
     if (revisit >= options_.decision.min_score) candidates.resize((candidates.size() + 1) / 2);
@@ -612,6 +613,29 @@ class LoopDetector::Impl {
                        is_wanted = std::exchange(seen.is_allowed, {})](PlaceId place) {
       return (!is_wanted || is_wanted(place)) && chi2(reach, place, end) <= Reach::kMaxChi2;
     };
+  }
+
+  /// Null where odometry does not tell how the robot moved since the latest step.
+  [[nodiscard]] AgreementOfMove agreement_of_moves(const Detection& detection) const {
+    const auto latest_step = frame_of(places_.step_of(places_.size()));
+    if (!detection.odometry || !latest_step) return {};
+    const auto latest = odometry_.to_next(*latest_step, odometry_.next(detection.odometry));
+    if (!latest) return {};
+    return [this, agreement = MoveAgreement(odometry_, *latest)](
+               std::ptrdiff_t from, std::ptrdiff_t to) -> std::optional<double> {
+      const auto begin = frame_of(from);
+      if (!begin) return std::nullopt;
+      const auto end = frame_of(to);
+      if (!end) return 1;  // the path ends before
+      return agreement.likelihood({frame_of(from - 1), *begin, frame_of(from + 1)}, *end);
+    };
+  }
+
+  /// The frame of this session that shows a step first, if there is one.
+  [[nodiscard]] std::optional<int> frame_of(std::ptrdiff_t step) const {
+    const auto place = places_.place_of(step);
+    if (!place || *place < places_.session_begin()) return std::nullopt;
+    return static_cast<int>(*place - places_.session_begin());
   }
 
   static bool is_among(const std::vector<Candidate>& candidates, PlaceId place) {

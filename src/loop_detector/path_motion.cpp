@@ -17,14 +17,9 @@ constexpr double kReturn = 1 / kUsualSteps;
 /// of the same path, each has less to say, and the path ends at it more seldom.
 constexpr double kUsualIndependent = kUsualSteps / 3;
 
-constexpr std::ptrdiff_t kMaxMove = 4;
-
-/// How likely it is to move by 0, 1, 2 steps, and so on.
-using Moves = std::array<double, kMaxMove + 1>;
-
 struct Pace {
-  double share;  ///< of the robots that return
-  Moves moves;
+  double share;                            ///< of the robots that return
+  std::array<double, kMaxMove + 1> moves;  ///< see Moves
 };
 
 /// Most robots keep the pace of before, or images come as often. One that drives at half of it or
@@ -35,6 +30,8 @@ constexpr std::array<Pace, kNumPaces> kPaces{
 constexpr double kTurn = 0.01;
 /// As seldom, they take another pace.
 constexpr double kNewPace = 0.01;
+/// As seldom, odometry tells nothing of a move: wheels slip, or the path is seen from elsewhere.
+constexpr double kOdometryFails = 0.01;
 
 constexpr const Pace& pace_of(std::size_t motion) { return kPaces.at(motion % kNumPaces); }
 
@@ -53,6 +50,32 @@ auto item_at(const Items& items, std::ptrdiff_t step) {
   using Item = typename Items::value_type;
   const auto found = std::ranges::lower_bound(items, step, {}, &Item::step);
   return found != items.end() && found->step == step ? found : items.end();
+}
+
+constexpr Moves moves_at_all_paces() {
+  Moves moves{};
+  for (std::size_t m = 0; m < kNumMotions; ++m) moves.at(m) = pace_of(m).moves;
+  return moves;
+}
+constexpr Moves kMoves = moves_at_all_paces();
+
+/// Odometry tells how far the robot has moved, so paces count only where it fails. None: it does
+/// not tell.
+std::optional<Moves> moves_by(const AgreementOfMove& agreement, std::ptrdiff_t step) {
+  Moves moves = kMoves;
+  for (std::size_t m = 0; m < kNumMotions; ++m) {
+    double sum = 0;
+    for (std::size_t moved = 0; moved <= kMaxMove; ++moved) {
+      const auto agrees =
+          agreement(step, step + direction_of(m) * static_cast<std::ptrdiff_t>(moved));
+      if (!agrees) return std::nullopt;
+      double& move = moves[m][moved];
+      move = kOdometryFails * move + (1 - kOdometryFails) * *agrees / (kMaxMove + 1);
+      sum += move;
+    }
+    for (double& move : moves[m]) move /= sum;
+  }
+  return moves;
 }
 
 /// Of each state one step later, its probability after all frames by its predicted one.
@@ -155,9 +178,13 @@ double leave_probability(double independence, const Followed& followed) {
                   independence / (kUsualIndependent + followed.independent));
 }
 
-Belief one_step_later(const Belief& belief, double leave) {
+Belief one_step_later(const Belief& belief, double leave, const AgreementOfMove& agreement) {
   std::map<std::ptrdiff_t, Hypothesis> next;
+  Belief later{.places = {}, .leave = leave};
   for (const Hypothesis& h : belief.places) {
+    const auto by_odometry = agreement ? moves_by(agreement, h.step) : std::nullopt;
+    if (by_odometry) later.moves.push_back({h.step, *by_odometry});
+    const Moves& moves = by_odometry ? *by_odometry : kMoves;
     for (std::size_t m = 0; m < kNumMotions; ++m) {
       double stays = 0;
       for (std::size_t before = 0; before < kNumMotions; ++before) {
@@ -165,14 +192,13 @@ Belief one_step_later(const Belief& belief, double leave) {
       }
       if (stays == 0) continue;
       for (std::ptrdiff_t moved = 0; moved <= kMaxMove; ++moved) {
-        const double probability = pace_of(m).moves[static_cast<std::size_t>(moved)];
+        const double probability = moves[m][static_cast<std::size_t>(moved)];
         if (probability == 0) continue;
         Hypothesis& there = next[h.step + direction_of(m) * moved];
         there.by_motion[m] += probability * (1 - leave) * stays;
       }
     }
   }
-  Belief later{.places = {}, .leave = leave};
   later.places.reserve(next.size());
   for (const auto& [step, h] : next) later.places.push_back({step, h.by_motion});
   return later;
@@ -194,11 +220,13 @@ Belief one_step_earlier(const Belief& belief, const Belief& prior, const Returns
   double sum = belief.elsewhere() * ratios.away();
   for (Hypothesis& h : earlier.places) {
     const auto near = ratios.around(h.step);
+    const auto by_odometry = item_at(prior.moves, h.step);
+    const Moves& moves = by_odometry == prior.moves.end() ? kMoves : by_odometry->moves;
     std::array<double, kNumMotions> after{};
     for (std::size_t m = 0; m < kNumMotions; ++m) {
       for (std::ptrdiff_t moved = 0; moved <= kMaxMove; ++moved) {
         const auto there = static_cast<std::size_t>(kMaxMove + direction_of(m) * moved);
-        after[m] += pace_of(m).moves[static_cast<std::size_t>(moved)] * near[there].by_motion[m];
+        after[m] += moves[m][static_cast<std::size_t>(moved)] * near[there].by_motion[m];
       }
     }
     for (std::size_t m = 0; m < kNumMotions; ++m) {

@@ -29,10 +29,24 @@ struct Hypothesis {
   }
 };
 
+/// At most so many steps of a path per step.
+inline constexpr std::ptrdiff_t kMaxMove = 4;
+
+/// How likely it is to move by 0, 1, 2 steps, and so on, for each motion.
+using Moves = std::array<std::array<double, kMaxMove + 1>, kNumMotions>;
+
+/// From a step of the past.
+struct MovesFrom {
+  std::ptrdiff_t step = 0;
+  Moves moves{};
+};
+
 /// A probability for each of a few steps, in their order; the rest is somewhere new.
 struct Belief {
   std::vector<Hypothesis> places;
   double leave = 0;  ///< if predicted: the probability that the robot has just left its path
+  /// If predicted: from the steps where odometry tells how likely they are.
+  std::vector<MovesFrom> moves = {};
 
   [[nodiscard]] double elsewhere() const;
   [[nodiscard]] double at(std::ptrdiff_t step) const;
@@ -79,8 +93,14 @@ struct Followed {
 /// independent witnesses that step is worth.
 double leave_probability(double independence, const Followed& followed);
 
+/// How well odometry agrees, 0 to 1, with a move between two steps of the past. None: it does not
+/// tell.
+using AgreementOfMove =
+    std::function<std::optional<double>(std::ptrdiff_t from, std::ptrdiff_t to)>;
+
 /// Where the robot is one step later, if it follows a path and leaves it with probability `leave`.
-Belief one_step_later(const Belief& belief, double leave);
+/// `agreement`: null = there is no odometry.
+Belief one_step_later(const Belief& belief, double leave, const AgreementOfMove& agreement = {});
 
 /// Adds what a robot elsewhere may return to.
 void add_returns(const Returns& returns, Belief& belief);

@@ -230,9 +230,9 @@ std::optional<std::size_t> PlaceFilter::match_near(std::ptrdiff_t middle,
       [](const Observed& o) { return o.log_likelihood_ratio(); });
 }
 
-Belief PlaceFilter::predict(bool is_step) const {
+Belief PlaceFilter::predict(bool is_step, const AgreementOfMove& agreement) const {
   if (!is_step) return before_;
-  return one_step_later(belief_, leave_probability(votes_.independence(), followed_));
+  return one_step_later(belief_, leave_probability(votes_.independence(), followed_), agreement);
 }
 
 std::vector<std::ptrdiff_t> PlaceFilter::likeliest(const Belief& belief, double min_probability,

@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+
+#include "loopbit/odometry.hpp"
+
+namespace loopbit {
+
+/// How well odometry agrees that the robot follows an earlier path. A camera that sees again what
+/// it saw there moves as it moved there: as far ahead, to the side and up, and with the same turns.
+/// Only motions between near frames count, so it does not matter how far odometry has drifted.
+class MoveAgreement {
+ public:
+  /// `track`, which must outlive this: of the path. `latest`: the motion of the last step.
+  MoveAgreement(const OdometryTrack& track, const Motion& latest);
+
+  /// Frames of the path: where a move begins, and one step before and after that.
+  struct Around {
+    std::optional<int> before;
+    int at = 0;
+    std::optional<int> after;
+  };
+
+  /// The likelihood of a move from `begin` to the frame `end`, as a share of that of the same
+  /// motion: 0 to 1. Both motions are known to a step: by as much as the camera moves or turns from
+  /// one step to the next, either way (a uniform distribution), and by the drift of odometry. None
+  /// if odometry is not known.
+  [[nodiscard]] std::optional<double> likelihood(const Around& begin, int end) const;
+
+ private:
+  const OdometryTrack* track_;
+  Motion latest_;
+};
+
+}  // namespace loopbit
