@@ -22,11 +22,9 @@
 #include "companion.hpp"
 #include "image_parts.hpp"
 #include "late_loops.hpp"
-#include "move_agreement.hpp"
 #include "place_filter.hpp"
 #include "places.hpp"
-#include "reach.hpp"
-#include "shortcuts.hpp"
+#include "session_odometry.hpp"
 #include "workspace.hpp"
 
 namespace loopbit {
@@ -114,9 +112,8 @@ class LoopDetector::Impl {
  public:
   Impl(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
       : options_(validated(options)),
-        odometry_(options.odometry),
-        paths_(odometry_, shortcuts_, Reach::views_sq(options.decision)),
         places_(options_, std::move(map)),
+        odometry_(options_, places_),
         filter_(places_),
         workspaces_([this] { return std::make_unique<Workspace>(options_, places_); }) {}
 
@@ -198,7 +195,8 @@ class LoopDetector::Impl {
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
     auto candidates = similar_places(detection, end, seen);
-    Belief prior = place_filter_.predict(seen.look.is_step, agreement_of_moves(detection));
+    Belief prior =
+        place_filter_.predict(seen.look.is_step, odometry_.agreement(detection.odometry));
     // Where the robot is sure to be back, half of them are rivals enough.
     const double revisit = 1 - prior.elsewhere();
     if (revisit >= options_.decision.min_score) candidates.resize((candidates.size() + 1) / 2);
@@ -272,7 +270,7 @@ class LoopDetector::Impl {
     if (detection.status == Status::loop) {
       const std::ptrdiff_t latest = places_.step_of(places_.size());
       found.add(seen.look.is_step ? latest + 1 : latest, seen.best->step);
-      shortcuts = shortcuts_with(detection, seen);
+      if (seen.reach) shortcuts = odometry_.shortcuts_with(detection, *seen.reach);
     }
     LateLoops::Next frame;
     if (!options_.decision.count_matches) {
@@ -287,13 +285,13 @@ class LoopDetector::Impl {
     attached_parts_.remember(working_size_px, seen.all_keypoints);
     latest_view_inliers_ = seen.view_inliers;
     places_.known_loops().take(found);
-    if (shortcuts) shortcuts_.commit(std::move(*shortcuts));
+    if (shortcuts) odometry_.commit(std::move(*shortcuts));
     place_filter_.commit(std::move(next));
     if (options_.decision.count_matches) return;
     late_loops_.commit(std::move(frame), seen.look.is_step, seen.changed);
     for (const LateLoops::Loop& loop : seen.changed.withdrawn) {
       places_.known_loops().remove(places_.step_of(loop.frame), loop.matched_step);
-      shortcuts_.remove(loop.frame - places_.session_begin());
+      odometry_.remove_shortcut(loop.frame - places_.session_begin());
     }
   }
 
@@ -364,7 +362,7 @@ class LoopDetector::Impl {
     const std::ptrdiff_t wrong_step = places_.step_of(*wrong);
     places_.known_loops().remove(step, wrong_step);
     if (*place < places_.session_begin()) return;
-    shortcuts_.remove(query.frame);
+    odometry_.remove_shortcut(query.frame);
     place_filter_.withdraw(wrong_step, places_.known_loops());
     late_loops_.reject(*place, wrong_step, places_.known_loops());
     if (places_.step_of(places_.size() - 1) == step) filter_.reject(*wrong);
@@ -568,20 +566,6 @@ class LoopDetector::Impl {
                               options_.retrieval.shift_tolerance_columns)};
   }
 
-  /// How far `place` is by odometry, see Reach::chi2(): the most of all visits before `end`, since
-  /// what drifted least since one of them tells most. Places of earlier sessions are not known to
-  /// odometry.
-  [[nodiscard]] double chi2(const Reach& reach, PlaceId place, PlaceId end) const {
-    const PlaceId begin = places_.session_begin();
-    const std::ptrdiff_t step = places_.step_of(place);
-    double most = place < begin ? 0 : reach.chi2(place - begin);
-    places_.known_loops().for_each_visit(step, places_.step_of(end), [&](std::ptrdiff_t at) {
-      const auto visited = at == step ? std::nullopt : places_.place_of(at);
-      if (visited && *visited >= begin) most = std::max(most, reach.chi2(*visited - begin));
-    });
-    return most;
-  }
-
   /// The places most similar to the frame. By odometry, only those in reach may match. The others
   /// still show what wrong places have, and in their stead less similar ones may match, too. `end`:
   /// of the candidates.
@@ -608,55 +592,16 @@ class LoopDetector::Impl {
 
   /// `end`: of the candidates.
   void keep_in_reach(const OdometryPose& odometry, PlaceId end, Observation& seen) const {
-    seen.reach.emplace(odometry_, paths_, odometry, options_.decision);
+    seen.reach.emplace(odometry_.reach(odometry));
     seen.is_allowed = [this, end, &reach = *seen.reach,
                        is_wanted = std::exchange(seen.is_allowed, {})](PlaceId place) {
-      return (!is_wanted || is_wanted(place)) && chi2(reach, place, end) <= Reach::kMaxChi2;
+      return (!is_wanted || is_wanted(place)) &&
+             odometry_.chi2(reach, place, end) <= Reach::kMaxChi2;
     };
-  }
-
-  /// Null where odometry does not tell how the robot moved since the latest step.
-  [[nodiscard]] AgreementOfMove agreement_of_moves(const Detection& detection) const {
-    const auto latest_step = frame_of(places_.step_of(places_.size()));
-    if (!detection.odometry || !latest_step) return {};
-    const auto latest = odometry_.to_next(*latest_step, odometry_.next(detection.odometry));
-    if (!latest) return {};
-    return [this, agreement = MoveAgreement(odometry_, *latest)](
-               std::ptrdiff_t from, std::ptrdiff_t to) -> std::optional<double> {
-      const auto begin = frame_of(from);
-      if (!begin) return std::nullopt;
-      const auto end = frame_of(to);
-      if (!end) return 1;  // the path ends before
-      return agreement.likelihood({frame_of(from - 1), *begin, frame_of(from + 1)}, *end);
-    };
-  }
-
-  /// The frame of this session that shows a step first, if there is one.
-  [[nodiscard]] std::optional<int> frame_of(std::ptrdiff_t step) const {
-    const auto place = places_.place_of(step);
-    if (!place || *place < places_.session_begin()) return std::nullopt;
-    return static_cast<int>(*place - places_.session_begin());
   }
 
   static bool is_among(const std::vector<Candidate>& candidates, PlaceId place) {
     return std::ranges::find(candidates, place, &Candidate::place) != candidates.end();
-  }
-
-  /// A loop that odometry does not doubt is a shortcut as soon as another one agrees with it, far
-  /// enough away to be more than the same coincidence.
-  [[nodiscard]] std::optional<Shortcuts::Next> shortcuts_with(const Detection& loop,
-                                                              const Observation& seen) const {
-    const auto undoubted = [](double chi2) { return Reach::weight(chi2) == 1; };
-    if (!seen.reach || !loop.match || !odometry_.is_known(*loop.match)) return std::nullopt;
-    if (!undoubted(seen.reach->chi2(*loop.match))) return std::nullopt;
-    const auto& awaiting = shortcuts_.awaiting();
-    if (!awaiting) return shortcuts_.prepare({loop.frame, *loop.match}, false);
-    const double path_m = odometry_.next(loop.odometry).path_m;
-    if (path_m - odometry_.path_m(awaiting->frame) < options_.odometry.correlated_m) {
-      return std::nullopt;
-    }
-    const bool agrees = undoubted(seen.reach->chi2(*awaiting, *loop.match));
-    return shortcuts_.prepare({loop.frame, *loop.match}, agrees);
   }
 
   static bool is_candidate(PlaceId place, PlaceId end, const Observation& seen) {
@@ -711,7 +656,7 @@ class LoopDetector::Impl {
         .return_weight =
             [&](std::ptrdiff_t step) {
               const auto place = seen.reach ? places_.place_of(step) : std::nullopt;
-              return place ? Reach::weight(chi2(*seen.reach, *place, end)) : 1.0;
+              return place ? Reach::weight(odometry_.chi2(*seen.reach, *place, end)) : 1.0;
             },
         .is_step = seen.look.is_step,
         .votes_just_left = seen.votes_just_left};
@@ -817,13 +762,11 @@ class LoopDetector::Impl {
   }
 
   LoopDetectorOptions options_;
-  OdometryTrack odometry_;  ///< of this session
-  Shortcuts shortcuts_;
-  mutable SurestPaths paths_;  ///< only process() asks for them, which is not const
-  cv::Mat1b mask_;             ///< of all images; empty = none
-  BinaryContent excluded_;     ///< by the mask
+  cv::Mat1b mask_;          ///< of all images; empty = none
+  BinaryContent excluded_;  ///< by the mask
   std::optional<CameraModel> camera_;
   Places places_;
+  mutable SessionOdometry odometry_;  ///< only process() asks for its reach, which is not const
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
   AttachedParts attached_parts_;
   CandidateFilter filter_;
