@@ -57,7 +57,7 @@ struct FilterRobot {
   KnownLoops loops;
   std::function<bool(std::ptrdiff_t)> may_be_at = [](std::ptrdiff_t) { return true; };
   std::function<double(std::ptrdiff_t)> return_weight = [](std::ptrdiff_t) { return 1.0; };
-  AgreementOfMove agreement = {};
+  AgreementOfMoves agreement = {};
   std::function<bool(std::ptrdiff_t)> may_match = [](std::ptrdiff_t) { return true; };
   std::size_t num_similar = kSimilar;
   std::vector<int> votes_just_left;

@@ -3,7 +3,6 @@
 #include "late_loops.hpp"
 
 #include <cstddef>
-#include <cstdlib>
 #include <map>
 #include <optional>
 #include <set>
@@ -187,9 +186,9 @@ TEST(PathMotion, APathThatLastedIsLeftMoreSeldom) {
 }
 
 /// That the robot moved by two steps of every path. Nothing is known of those before step 200.
-std::optional<double> by_two(std::ptrdiff_t from, std::ptrdiff_t to) {
-  if (from < 200) return std::nullopt;
-  return std::abs(to - from) == 2 ? 1.0 : 0.0;
+std::optional<OfMoves> by_two(std::ptrdiff_t step) {
+  if (step < 200) return std::nullopt;
+  return OfMoves{0, 0, 1, 0, 0, 0, 1, 0, 0};
 }
 
 TEST(PathMotion, OdometryTellsHowFar) {
@@ -204,6 +203,13 @@ TEST(PathMotion, OdometryTellsHowFar) {
   EXPECT_LT(later.at(201), 0.01);
 }
 
+TEST(PathMotion, OneStepEarlierAgreesWithOdometry) {
+  const Belief belief{{{200, {0.4}}, {201, {0.4}}}};
+  const Belief prior = one_step_later(belief, 0.01, by_two);
+  EXPECT_GT(one_step_earlier(belief, prior, {}, Belief{{{202, {1}}}}).at(200), 0.95);
+  EXPECT_GT(one_step_earlier(belief, prior, {}, Belief{{{203, {1}}}}).at(201), 0.95);
+}
+
 class OneStepEarlier : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(PathMotion, OneStepEarlier, testing::Bool(), [](const auto& odometry) {
   return odometry.param ? "WithOdometry" : "Without";
@@ -211,7 +217,7 @@ INSTANTIATE_TEST_SUITE_P(PathMotion, OneStepEarlier, testing::Bool(), [](const a
 
 TEST_P(OneStepEarlier, UndoesOneStepLater) {
   Belief belief{{{100, {0.3, 0.05, 0.05, 0.1}}, {200, {0.1, 0.1}}}};
-  Belief prior = one_step_later(belief, 0.01, GetParam() ? by_two : AgreementOfMove());
+  Belief prior = one_step_later(belief, 0.01, GetParam() ? by_two : AgreementOfMoves());
   const Returns returns = returns_to({100, 101, 500, 100}, kSteps,
                                      [](std::ptrdiff_t step) { return step == 101 ? 0.5 : 1.0; });
   ASSERT_EQ(returns.size(), 3U);

@@ -29,8 +29,10 @@ class MoveAgreementTest : public testing::Test {
 
   /// From `begin` by `moved` frames of the path, if the latest motion is `latest`.
   [[nodiscard]] double likelihood(const cv::Matx44d& latest, int begin, int moved) const {
-    const MoveAgreement agreement(track_, {latest, cv::Matx66d::eye() * 1e-6});
-    return agreement.likelihood({begin - 1, begin, begin + 1}, begin + moved).value_or(-1);
+    const Motion motion{latest, cv::Matx66d::eye() * 1e-6};
+    return MoveAgreement(track_, motion, {begin - 1, begin, begin + 1})
+        .likelihood(begin + moved)
+        .value_or(-1);
   }
 
   OdometryTrack track_;
@@ -66,7 +68,7 @@ TEST_F(MoveAgreementTest, OnlyDifferencesOfPosesCount) {
   onwards.add(OdometryPose{begun.pose});
   const auto ahead = onwards.to_next(20, onwards.next(OdometryPose{camera_at(1, 10, 90)}));
   ASSERT_TRUE(ahead);
-  EXPECT_GT(MoveAgreement(onwards, *ahead).likelihood({3, 4, 5}, 5), 0.9);
+  EXPECT_GT(MoveAgreement(onwards, *ahead, {3, 4, 5}).likelihood(5), 0.9);
 }
 
 TEST_F(MoveAgreementTest, ACameraAtRestAgreesWithAPathAtRest) {
@@ -75,17 +77,18 @@ TEST_F(MoveAgreementTest, ACameraAtRestAgreesWithAPathAtRest) {
   const auto rest = at_rest.between(0, 1);
   ASSERT_TRUE(rest);
   for (const int end : {0, 1, 3}) {
-    EXPECT_NEAR(MoveAgreement(at_rest, *rest).likelihood({0, 1, 2}, end).value_or(-1), 1, 1e-6);
+    EXPECT_NEAR(MoveAgreement(at_rest, *rest, {0, 1, 2}).likelihood(end).value_or(-1), 1, 1e-6);
   }
 }
 
 TEST_F(MoveAgreementTest, IsNotKnownWithoutOdometry) {
   track_.add(std::nullopt);
   track_.add(OdometryPose{camera_at(0, 10, 90)});
-  const MoveAgreement agreement(track_, {camera_at(0, 1, 0), cv::Matx66d::eye()});
-  EXPECT_FALSE(agreement.likelihood({19, 20, 21}, 21));
-  EXPECT_FALSE(agreement.likelihood({std::nullopt, 19, 20}, 20));
-  EXPECT_TRUE(agreement.likelihood({18, 19, 20}, 21)) << "frames beside it are not needed";
+  const Motion latest{camera_at(0, 1, 0), cv::Matx66d::eye()};
+  EXPECT_FALSE(MoveAgreement(track_, latest, {19, 20, 21}).likelihood(21));
+  EXPECT_FALSE(MoveAgreement(track_, latest, {std::nullopt, 19, 20}).likelihood(20));
+  EXPECT_TRUE(MoveAgreement(track_, latest, {18, 19, 20}).likelihood(21))
+      << "frames beside it are not needed";
 }
 
 }  // namespace

@@ -317,8 +317,13 @@ TEST(PlaceFilter, OdometryTellsWhichStepComesNext) {
     for (int i = 0; i < 24; ++i) {
       const std::ptrdiff_t moved = i % 2 == 0 ? 0 : 4;
       if (with_odometry) {
-        robot.agreement = [moved](std::ptrdiff_t from, std::ptrdiff_t to) {
-          return std::abs(to - from) == moved ? 1.0 : 0.01;
+        robot.agreement = [moved](std::ptrdiff_t /*step*/) {
+          OfMoves agreement;
+          agreement.fill(0.01);
+          for (const std::ptrdiff_t by : {-moved, moved}) {
+            agreement[static_cast<std::size_t>(kMaxMove + by)] = 1;
+          }
+          return agreement;
         };
       }
       step += moved;

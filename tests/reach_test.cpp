@@ -11,6 +11,7 @@
 #include "loopbit/loop_detector.hpp"
 
 #include "map_support.hpp"
+#include "session_odometry.hpp"
 #include "shortcuts.hpp"
 #include "test_support.hpp"
 
@@ -164,6 +165,34 @@ TEST(ReachTest, WeightsAreLikelihoods) {
   EXPECT_EQ(Reach::weight(0), 1);
   EXPECT_EQ(Reach::weight(3), 1);
   EXPECT_NEAR(Reach::weight(13), std::exp(-5), 1e-12);
+}
+
+TEST(SessionOdometryTest, MovesAgreeAlongThePathAndBeyondItsEnds) {
+  const LoopDetectorOptions options;
+  Places places(options, nullptr);
+  SessionOdometry odometry(options, places);
+  EXPECT_FALSE(odometry.agreement_of_moves(camera_at(0, 0, 0))) << "there is no step to move from";
+  for (int frame = 0; frame < 20; ++frame) {
+    places.add(test::content_of(frame), {}, RecentView::Look{.is_step = true}, {}, {});
+    odometry.add(camera_at(0, 0, frame));
+  }
+  EXPECT_FALSE(odometry.agreement_of_moves(std::nullopt));
+  const auto agreement = odometry.agreement_of_moves(camera_at(0, 0, 20));
+  ASSERT_TRUE(agreement);
+  const auto expect_ahead = [](const OfMoves& moves) {
+    EXPECT_NEAR(moves[kMaxMove], std::exp(-1.5), 0.01);
+    EXPECT_NEAR(moves[kMaxMove + 1], 1, 0.01);
+    EXPECT_NEAR(moves[kMaxMove + 2], std::exp(-1.5), 0.01);
+  };
+  const auto middle = agreement(10);
+  ASSERT_TRUE(middle);
+  expect_ahead(*middle);
+  EXPECT_LT((*middle)[kMaxMove - 1], 0.01);
+  const auto begin = agreement(0);
+  ASSERT_TRUE(begin);
+  expect_ahead(*begin);
+  for (std::size_t i = 0; i < kMaxMove; ++i) EXPECT_EQ((*begin)[i], 1) << i;
+  EXPECT_FALSE(agreement(-1)) << "steps below 0 are those of other sessions";
 }
 
 /// A walk of two laps through twenty views, with odometry.

@@ -196,7 +196,7 @@ class LoopDetector::Impl {
     // Step 2: the earlier places that look alike, and those where the robot is expected.
     auto candidates = similar_places(detection, end, seen);
     Belief prior =
-        place_filter_.predict(seen.look.is_step, odometry_.agreement(detection.odometry));
+        place_filter_.predict(seen.look.is_step, odometry_.agreement_of_moves(detection.odometry));
     // Where the robot is sure to be back, half of them are rivals enough.
     const double revisit = 1 - prior.elsewhere();
     if (revisit >= options_.decision.min_score) candidates.resize((candidates.size() + 1) / 2);

@@ -35,15 +35,11 @@ double variance(const Motion& motion, int first_row) {
 
 }  // namespace
 
-MoveAgreement::MoveAgreement(const OdometryTrack& track, const Motion& latest)
-    : track_(&track), latest_(latest) {}
-
-std::optional<double> MoveAgreement::likelihood(const Around& begin, int end) const {
-  const auto move = track_->between(begin.at, end);
-  if (!move) return std::nullopt;
-  Size step = size_of(latest_);
+MoveAgreement::MoveAgreement(const OdometryTrack& track, const Motion& latest, const Around& begin)
+    : track_(track), latest_(latest), begin_(begin.at) {
+  Size step = size_of(latest);
   const auto include = [&](int from, int to) {
-    const auto beside = track_->between(from, to);
+    const auto beside = track.between(from, to);
     if (!beside) return;
     const Size size = size_of(*beside);
     step.move_sq = std::max(step.move_sq, size.move_sq);
@@ -51,14 +47,19 @@ std::optional<double> MoveAgreement::likelihood(const Around& begin, int end) co
   };
   if (begin.before) include(*begin.before, begin.at);
   if (begin.after) include(begin.at, *begin.after);
-
   constexpr double kUniform = 1.0 / 3;  // the variance of -1 to 1
+  known_ = {kUniform * step.move_sq + variance(latest, 0),
+            kUniform * step.turn_sq + variance(latest, 3)};
+}
+
+std::optional<double> MoveAgreement::likelihood(int end) const {
+  const auto move = track_.between(begin_, end);
+  if (!move) return std::nullopt;
   const double move_sq =
       squared(rigid::translation(latest_.T_from_to) - rigid::translation(move->T_from_to));
-  const double move_chi2 =
-      move_sq / (kUniform * step.move_sq + variance(latest_, 0) + variance(*move, 0));
+  const double move_chi2 = move_sq / (known_.move + variance(*move, 0));
   const double turn_chi2 = turn_sq(rigid::inverse(move->T_from_to) * latest_.T_from_to) /
-                           (kUniform * step.turn_sq + variance(latest_, 3) + variance(*move, 3));
+                           (known_.turn + variance(*move, 3));
   return std::exp(-0.5 * (move_chi2 + turn_chi2));
 }
 

@@ -52,6 +52,12 @@ auto item_at(const Items& items, std::ptrdiff_t step) {
   return found != items.end() && found->step == step ? found : items.end();
 }
 
+/// The index of a move in OfMoves, and of where it leads in Ratios::around().
+std::size_t move_index(std::size_t motion, std::size_t moved) {
+  return static_cast<std::size_t>(kMaxMove +
+                                  direction_of(motion) * static_cast<std::ptrdiff_t>(moved));
+}
+
 constexpr Moves moves_at_all_paces() {
   Moves moves{};
   for (std::size_t m = 0; m < kNumMotions; ++m) moves.at(m) = pace_of(m).moves;
@@ -61,16 +67,16 @@ constexpr Moves kMoves = moves_at_all_paces();
 
 /// Odometry tells how far the robot has moved, so paces count only where it fails. None: it does
 /// not tell.
-std::optional<Moves> moves_by(const AgreementOfMove& agreement, std::ptrdiff_t step) {
+std::optional<Moves> moves_by(const AgreementOfMoves& agreement, std::ptrdiff_t step) {
+  const auto agrees = agreement(step);
+  if (!agrees) return std::nullopt;
   Moves moves = kMoves;
   for (std::size_t m = 0; m < kNumMotions; ++m) {
     double sum = 0;
     for (std::size_t moved = 0; moved <= kMaxMove; ++moved) {
-      const auto agrees =
-          agreement(step, step + direction_of(m) * static_cast<std::ptrdiff_t>(moved));
-      if (!agrees) return std::nullopt;
       double& move = moves[m][moved];
-      move = kOdometryFails * move + (1 - kOdometryFails) * *agrees / (kMaxMove + 1);
+      move = kOdometryFails * move +
+             (1 - kOdometryFails) * (*agrees)[move_index(m, moved)] / (kMaxMove + 1);
       sum += move;
     }
     for (double& move : moves[m]) move /= sum;
@@ -178,7 +184,7 @@ double leave_probability(double independence, const Followed& followed) {
                   independence / (kUsualIndependent + followed.independent));
 }
 
-Belief one_step_later(const Belief& belief, double leave, const AgreementOfMove& agreement) {
+Belief one_step_later(const Belief& belief, double leave, const AgreementOfMoves& agreement) {
   std::map<std::ptrdiff_t, Hypothesis> next;
   Belief later{.places = {}, .leave = leave};
   for (const Hypothesis& h : belief.places) {
@@ -224,9 +230,8 @@ Belief one_step_earlier(const Belief& belief, const Belief& prior, const Returns
     const Moves& moves = by_odometry == prior.moves.end() ? kMoves : by_odometry->moves;
     std::array<double, kNumMotions> after{};
     for (std::size_t m = 0; m < kNumMotions; ++m) {
-      for (std::ptrdiff_t moved = 0; moved <= kMaxMove; ++moved) {
-        const auto there = static_cast<std::size_t>(kMaxMove + direction_of(m) * moved);
-        after[m] += moves[m][static_cast<std::size_t>(moved)] * near[there].by_motion[m];
+      for (std::size_t moved = 0; moved <= kMaxMove; ++moved) {
+        after[m] += moves[m][moved] * near[move_index(m, moved)].by_motion[m];
       }
     }
     for (std::size_t m = 0; m < kNumMotions; ++m) {

@@ -45,7 +45,7 @@ struct MovesFrom {
 struct Belief {
   std::vector<Hypothesis> places;
   double leave = 0;  ///< if predicted: the probability that the robot has just left its path
-  /// If predicted: from the steps where odometry tells how likely they are.
+  /// If predicted with odometry: the moves from each step where it is known.
   std::vector<MovesFrom> moves = {};
 
   [[nodiscard]] double elsewhere() const;
@@ -93,14 +93,16 @@ struct Followed {
 /// independent witnesses that step is worth.
 double leave_probability(double independence, const Followed& followed);
 
-/// How well odometry agrees, 0 to 1, with a move between two steps of the past. None: it does not
+/// For a move by -kMaxMove to kMaxMove steps along a path.
+using OfMoves = std::array<double, 2 * kMaxMove + 1>;
+
+/// How well odometry agrees, 0 to 1, with each move from a step of the past. None: it does not
 /// tell.
-using AgreementOfMove =
-    std::function<std::optional<double>(std::ptrdiff_t from, std::ptrdiff_t to)>;
+using AgreementOfMoves = std::function<std::optional<OfMoves>(std::ptrdiff_t step)>;
 
 /// Where the robot is one step later, if it follows a path and leaves it with probability `leave`.
 /// `agreement`: null = there is no odometry.
-Belief one_step_later(const Belief& belief, double leave, const AgreementOfMove& agreement = {});
+Belief one_step_later(const Belief& belief, double leave, const AgreementOfMoves& agreement = {});
 
 /// Adds what a robot elsewhere may return to.
 void add_returns(const Returns& returns, Belief& belief);

@@ -230,7 +230,7 @@ std::optional<std::size_t> PlaceFilter::match_near(std::ptrdiff_t middle,
       [](const Observed& o) { return o.log_likelihood_ratio(); });
 }
 
-Belief PlaceFilter::predict(bool is_step, const AgreementOfMove& agreement) const {
+Belief PlaceFilter::predict(bool is_step, const AgreementOfMoves& agreement) const {
   if (!is_step) return before_;
   return one_step_later(belief_, leave_probability(votes_.independence(), followed_), agreement);
 }
@@ -358,7 +358,7 @@ PlaceFilter::Update PlaceFilter::update(Belief prior,
   add_returns(update.returns, prior);
   share_among_laps(loops, prior.places);
 
-  update.belief = prior;
+  update.belief.places = prior.places;
   const double elsewhere = weigh(log_ratios(update.observed), update.belief);
   update.prior = std::move(prior);
   const auto middle = update.belief.peak();

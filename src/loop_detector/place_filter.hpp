@@ -86,7 +86,7 @@ class PlaceFilter {
 
   /// The frame to come, before it is seen. `is_step`: it changes the view; otherwise it stands for
   /// the last step. `agreement`: null = there is no odometry.
-  [[nodiscard]] Belief predict(bool is_step, const AgreementOfMove& agreement = {}) const;
+  [[nodiscard]] Belief predict(bool is_step, const AgreementOfMoves& agreement = {}) const;
 
   /// The steps with most probability, at least `min_probability`, far enough apart to be different
   /// paths, and at most `most`.

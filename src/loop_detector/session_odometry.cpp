@@ -9,11 +9,10 @@
 namespace loopbit {
 
 SessionOdometry::SessionOdometry(const LoopDetectorOptions& options, const Places& places)
-    : places_(places),
-      decision_(options.decision),
-      correlated_m_(options.odometry.correlated_m),
+    : options_(options),
+      places_(places),
       track_(options.odometry),
-      paths_(track_, shortcuts_, Reach::views_sq(decision_)) {}
+      paths_(track_, shortcuts_, Reach::views_sq(options.decision)) {}
 
 std::optional<int> SessionOdometry::frame_of(std::ptrdiff_t step) const {
   const auto place = places_.place_of(step);
@@ -32,18 +31,26 @@ double SessionOdometry::chi2(const Reach& reach, PlaceId place, PlaceId end) con
   return most;
 }
 
-AgreementOfMove SessionOdometry::agreement(const std::optional<OdometryPose>& now) const {
+AgreementOfMoves SessionOdometry::agreement_of_moves(const std::optional<OdometryPose>& now) const {
+  if (!now) return {};
   const auto latest_step = frame_of(places_.step_of(places_.size()));
-  if (!now || !latest_step) return {};
+  if (!latest_step) return {};
   const auto latest = track_.to_next(*latest_step, track_.next(now));
   if (!latest) return {};
-  return [this, agreement = MoveAgreement(track_, *latest)](
-             std::ptrdiff_t from, std::ptrdiff_t to) -> std::optional<double> {
-    const auto begin = frame_of(from);
+  return [this, latest = *latest](std::ptrdiff_t step) -> std::optional<OfMoves> {
+    const auto begin = frame_of(step);
     if (!begin) return std::nullopt;
-    const auto end = frame_of(to);
-    if (!end) return 1;  // the path ends before, where anything may follow
-    return agreement.likelihood({frame_of(from - 1), *begin, frame_of(from + 1)}, *end);
+    const MoveAgreement agreement(track_, latest, {frame_of(step - 1), *begin, frame_of(step + 1)});
+    OfMoves of_moves;
+    of_moves.fill(1);  // beyond the end of the path, where anything may follow
+    for (std::ptrdiff_t move = -kMaxMove; move <= kMaxMove; ++move) {
+      const auto end = frame_of(step + move);
+      if (!end) continue;
+      const auto likelihood = agreement.likelihood(*end);
+      if (!likelihood) return std::nullopt;
+      of_moves[static_cast<std::size_t>(kMaxMove + move)] = *likelihood;
+    }
+    return of_moves;
   };
 }
 
@@ -55,7 +62,7 @@ std::optional<Shortcuts::Next> SessionOdometry::shortcuts_with(const Detection& 
   const auto& awaiting = shortcuts_.awaiting();
   if (!awaiting) return shortcuts_.prepare({loop.frame, *loop.match}, false);
   const double driven_m = track_.next(loop.odometry).path_m - track_.path_m(awaiting->frame);
-  if (driven_m < correlated_m_) return std::nullopt;
+  if (driven_m < options_.odometry.correlated_m) return std::nullopt;
   const bool agrees = undoubted(reach.chi2(*awaiting, *loop.match));
   return shortcuts_.prepare({loop.frame, *loop.match}, agrees);
 }

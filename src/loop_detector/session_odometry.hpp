@@ -21,18 +21,21 @@ namespace loopbit {
 /// from one to the next. Earlier sessions are not known to it.
 class SessionOdometry {
  public:
-  /// `places` must outlive this.
+  /// `options` and `places` must outlive this.
   SessionOdometry(const LoopDetectorOptions& options, const Places& places);
 
   /// From the frame to come. It must not outlive this. Not thread-safe.
-  [[nodiscard]] Reach reach(const OdometryPose& now) { return {track_, paths_, now, decision_}; }
+  [[nodiscard]] Reach reach(const OdometryPose& now) {
+    return {track_, paths_, now, options_.decision};
+  }
 
   /// How far `place` is, see Reach::chi2(): the most of all visits before `end`, since what drifted
   /// least since one of them tells most.
   [[nodiscard]] double chi2(const Reach& reach, PlaceId place, PlaceId end) const;
 
-  /// How the frame to come moved since the latest step. Null if that is not known.
-  [[nodiscard]] AgreementOfMove agreement(const std::optional<OdometryPose>& now) const;
+  /// How well moves along a path agree with the motion since the latest step. Null if that is not
+  /// known. `now`: at the frame to come. The answer must not outlive this.
+  [[nodiscard]] AgreementOfMoves agreement_of_moves(const std::optional<OdometryPose>& now) const;
 
   /// What commit() needs if `loop` tells anything. A loop that odometry does not doubt is a
   /// shortcut as soon as another one agrees with it, far enough away to be more than the same
@@ -52,9 +55,8 @@ class SessionOdometry {
   /// The frame that shows a step first, if it is one of this session.
   [[nodiscard]] std::optional<int> frame_of(std::ptrdiff_t step) const;
 
+  const LoopDetectorOptions& options_;
   const Places& places_;
-  DecisionOptions decision_;
-  double correlated_m_;
   OdometryTrack track_;
   Shortcuts shortcuts_;
   SurestPaths paths_;
