@@ -2,16 +2,18 @@
 // SPDX-License-Identifier: MIT
 // A run on images that come as a camera's do, for live_test.mjs:
 //
-//   live_run IMAGES OUT FRAMES_PER_S [live]
+//   live_run IMAGES OUT FRAMES_PER_S BUFFERS [live]
 //
-// With `live` it serves the live page, prints its URL and waits for a line on stdin, before the
-// first frame and before the last tenth. At last it prints a line of JSON.
+// Frames that the run takes too late for so many BUFFERS are lost; drivers of cameras (V4L2)
+// usually have four. With `live` it serves the live page, prints its URL and waits for a line on
+// stdin, before the first frame and before the last tenth. At last it prints a line of JSON.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <functional>
 #include <iostream>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -33,26 +35,29 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::duration;
 
-/// As many as drivers of cameras (V4L2) usually have.
-constexpr int kBuffers = 4;
-
-/// Gives the frames at a rate, as a camera with kBuffers does: if the run takes them too late, they
-/// are lost.
+/// Gives the frames at a rate, as a camera with some buffers does: if the run takes them too late,
+/// they are lost.
 class Camera final : public loopbit::ImageSource {
  public:
   /// `wait`: called before the first frame and before the last tenth.
-  Camera(std::unique_ptr<loopbit::ImageSource> images, double rate, std::function<void()> wait)
-      : images_(std::move(images)), period_(1.0 / rate), wait_(std::move(wait)) {}
+  Camera(std::unique_ptr<loopbit::ImageSource> images, double rate, int buffers,
+         std::function<void()> wait)
+      : images_(std::move(images)),
+        period_(1.0 / rate),
+        buffers_(buffers),
+        wait_(std::move(wait)) {}
 
   bool next(loopbit::Frame& frame) override {
     auto asked = Clock::now();
     if (taken_ > 0) busy_ += asked - given_;
-    if (taken_ == 0 || taken_ == static_cast<int>(*images_->size()) * 9 / 10) {
+    if (taken_ >= next_wait_) {
+      next_wait_ = taken_ == 0 ? static_cast<int>(*images_->size()) * 9 / 10
+                               : std::numeric_limits<int>::max();
       wait_();
       asked = Clock::now();
       start_ = asked - std::chrono::duration_cast<Clock::duration>(taken_ * period_);
     }
-    while (asked - start_ > (taken_ + kBuffers) * period_ && images_->skip()) {
+    while (asked - start_ > (taken_ + buffers_) * period_ && images_->skip()) {
       ++taken_;
       ++dropped_;
     }
@@ -76,11 +81,13 @@ class Camera final : public loopbit::ImageSource {
  private:
   std::unique_ptr<loopbit::ImageSource> images_;
   duration<double> period_;
+  int buffers_;
   std::function<void()> wait_;
   Clock::time_point start_;
   Clock::time_point given_;
   Clock::duration busy_{0};
   int taken_ = 0;
+  int next_wait_ = 0;  ///< how many are taken then
   int dropped_ = 0;
 };
 
@@ -93,7 +100,8 @@ double cpu_ms() {
   return ms(usage.ru_utime) + ms(usage.ru_stime);
 }
 
-int run(const std::string& images, const std::string& folder, double rate, bool is_live) {
+int run(const std::string& images, const std::string& folder, double rate, int buffers,
+        bool is_live) {
   std::unique_ptr<loopbit::LivePage> page;
   if (is_live) {
     page = std::make_unique<loopbit::LivePage>(loopbit::LivePage::Options{.port = 0});
@@ -107,7 +115,7 @@ int run(const std::string& images, const std::string& folder, double rate, bool 
     waited_ms += cpu_ms() - before_ms;
   };
   cv::setNumThreads(1);
-  auto camera = std::make_unique<Camera>(loopbit::open_source(images), rate, wait);
+  auto camera = std::make_unique<Camera>(loopbit::open_source(images), rate, buffers, wait);
   const Camera& frames = *camera;
   loopbit::RunInput input(std::move(camera), images);
   const loopbit::RunListener listener{[](const auto&) {}, [](const auto&) {}};
@@ -130,6 +138,6 @@ int run(const std::string& images, const std::string& folder, double rate, bool 
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc < 4) return 2;
-  return run(argv[1], argv[2], std::atof(argv[3]), argc > 4);
+  if (argc < 5) return 2;
+  return run(argv[1], argv[2], std::atof(argv[3]), std::atoi(argv[4]), argc > 5);
 }

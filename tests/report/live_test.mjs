@@ -34,6 +34,9 @@ function argumentsOf(words) {
   return found;
 }
 
+/** Frames are lost only where that is asked for: the page cannot show them. */
+const buffers = (given) => (given.strict ? "4" : given.frames);
+
 /** A program, and its lines of output one by one. */
 function start(program, ...words) {
   const child = spawn(program, words, { stdio: ["pipe", "pipe", "pipe"] });
@@ -120,7 +123,7 @@ async function checkServer(page, url) {
 async function checkCamera(browser, given, images, scratch) {
   const frames = Number(given.frames);
   const folder = path.join(scratch, "watched");
-  const run = start(given.run, images, folder, given.rate, "live");
+  const run = start(given.run, images, folder, given.rate, buffers(given), "live");
   const url = await run.line();
   const viewers = [];
   for (let i = 0; i < Number(given.viewers); ++i)
@@ -200,7 +203,7 @@ try {
     ...town.flatMap((setting) => ["--world", setting]),
   ]);
   const images = path.join(scratch, "town", "images");
-  const alone = start(given.run, images, path.join(scratch, "alone"), given.rate);
+  const alone = start(given.run, images, path.join(scratch, "alone"), given.rate, buffers(given));
   const without = JSON.parse(await alone.line());
   const browser = await launch(given.playwright);
   const watched = await checkCamera(browser, given, images, scratch);
