@@ -239,6 +239,10 @@ class PostgresServer:
                                self.address(database)], check=True, capture_output=True, text=True,
                               timeout=self.limit_s).stdout
 
+    def latest_epoch(self, database):
+        """The newest epoch of the map in a database."""
+        return int(self.sql(database, "SELECT max(epoch) FROM loopbit.batch"))
+
     def close(self):
         with contextlib.suppress(subprocess.CalledProcessError):
             self.call("pg_ctl", "-D", self.data, "-m", "immediate", "-w", "stop")

@@ -123,7 +123,7 @@ class FleetTest(CommandTest):
         image = sorted(self.images.iterdir())[3]
         answer = json.loads(self.lines("query", viewer, image, "--json")[0])
         self.assertIn(answer.pop("epoch", None),    # none if the server searches
-                      (None, int(self.server.sql("town", "SELECT max(epoch) FROM loopbit.batch"))))
+                      (None, self.server.latest_epoch("town")))
         self.assertEqual(answer, json.loads(self.lines("query", self.file, image, "--json")[0]))
         for form in ("csv", "g2o"):
             self.assertEqual(self.lines("map", "export", viewer, "--format", form),
@@ -328,7 +328,7 @@ class FleetTest(CommandTest):
             self.assertEqual(ran.returncode, 0, ran.stderr)
             image = sorted(self.images.iterdir())[3]
             query = ("query", address, image, "--json", "--epoch")
-            epoch = int(self.server.sql("together", "SELECT max(epoch) FROM loopbit.batch"))
+            epoch = self.server.latest_epoch("together")
             answer = self.lines(*query, epoch)
             self.assertEqual(json.loads(answer[0])["epoch"], epoch)
             run.send_signal(signal.SIGCONT)

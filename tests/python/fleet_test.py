@@ -74,7 +74,7 @@ def test_an_answer_is_as_of_an_epoch(server, maps, images):
     before = loopbit.LoopDetector(map=reader).query(images[LAP + 5])
     latest = loopbit.MapReader(address)
     # A lap is one epoch or more: the slower the machine, the more commits it is written in.
-    latest.set_epoch(int(server.sql("town", "SELECT max(epoch) FROM loopbit.batch")))
+    latest.set_epoch(server.latest_epoch("town"))
     now = loopbit.LoopDetector(map=latest).query(images[LAP + 5])
     assert now.epoch > before.epoch == epoch > 0
     assert before.earlier_match.session == 1
