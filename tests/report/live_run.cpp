@@ -87,7 +87,7 @@ class Camera final : public loopbit::ImageSource {
   Clock::time_point given_;
   Clock::duration busy_{0};
   int taken_ = 0;
-  int next_wait_ = 0;  ///< how many are taken then
+  int next_wait_ = 0;  ///< after so many frames
   int dropped_ = 0;
 };
 
