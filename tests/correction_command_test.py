@@ -25,6 +25,11 @@ def table(file):
         return list(csv.DictReader(stream))
 
 
+def numbers(file):
+    rows = (line.split() for line in file.read_text().splitlines() if not line.startswith("#"))
+    return [float(word) for row in rows for word in row]
+
+
 class CorrectionTest(CommandTest):
     """All share a drive through two storeys and a run on it, beside the town of other tests."""
 
@@ -158,8 +163,12 @@ class CorrectionTest(CommandTest):
         self.assertIn("--reject", ran.stdout)
         self.assertEqual(storeys.read_bytes(), before, "it was only read")
         for name in ("corrected.tum", "corrected.kitti"):
-            of_session = out / name.replace(".", "_1.")
-            self.assertEqual(of_session.read_bytes(), (self.corrected / name).read_bytes(), name)
+            # Written with nine digits, of which the last may be rounded otherwise.
+            of_session, of_run = (numbers(file)
+                                  for file in (out / name.replace(".", "_1."), self.corrected / name))
+            self.assertEqual(len(of_session), len(of_run), name)
+            for here, there in zip(of_session, of_run):
+                self.assertAlmostEqual(here, there, delta=1e-6, msg=name)
         for row in ("VERTEX_SE3:QUAT ", "EDGE_SE3:QUAT ", "#EDGE_SE3:QUAT "):
             counts = [sum(line.startswith(row) for line in (folder / "graph.g2o").read_text().splitlines())
                       for folder in (out, self.corrected)]

@@ -15,8 +15,6 @@ namespace {
 
 /// Steps at most so far apart show the same place.
 constexpr std::ptrdiff_t kOnePathSteps = 12;
-/// The match is the one that shows most among places so close to the likeliest step.
-constexpr std::ptrdiff_t kMatchSteps = 3;
 /// Laps known to be one place share a fifth of their probability with each step.
 constexpr double kShareOfLaps = 0.2;
 /// Hypotheses below this are dropped: some twenty frames of evidence could not bring them back.
@@ -218,16 +216,14 @@ double PlaceFilter::rounded(double value) {
 std::optional<std::size_t> PlaceFilter::match_near(std::ptrdiff_t middle,
                                                    const std::vector<Observed>& observed,
                                                    const Belief& belief, const KnownLoops& loops) {
-  const auto match = best_of(
-      observed, [&](const Observed& o) { return std::abs(o.step - middle) <= kMatchSteps; },
-      [&](const Observed& o) {
-        // One place may show more than the next by chance.
-        return belief.at(o.step) + (belief.at(o.step - 1) + belief.at(o.step + 1)) / 2;
-      });
-  if (match) return match;
   return best_of(
       observed, [&](const Observed& o) { return is_near(o.step, middle, loops); },
-      [](const Observed& o) { return o.log_likelihood_ratio(); });
+      [&](const Observed& o) {
+        // One step may be more probable than the next by chance.
+        const double probability =
+            belief.at(o.step) + (belief.at(o.step - 1) + belief.at(o.step + 1)) / 2;
+        return std::pair(probability * o.num_votes, o.log_likelihood_ratio());
+      });
 }
 
 Belief PlaceFilter::predict(bool is_step, const AgreementOfMoves& agreement) const {
@@ -329,6 +325,7 @@ void PlaceFilter::observe(const std::vector<VerifiedCandidate>& verified, std::s
     Observed o{.candidate = verified[i].candidate,
                .step = verified[i].step,
                .may_match = verified[i].may_match,
+               .num_votes = verified[i].votes.count,
                .sigmas = sigmas[i],
                .square = verified[i].votes.square};
     if (steady[i]) o.steady_sigmas = steady[i]->sigmas;

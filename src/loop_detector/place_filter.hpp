@@ -38,6 +38,7 @@ class PlaceFilter {
     Candidate candidate;
     std::ptrdiff_t step = 0;
     bool may_match = true;  ///< see VerifiedCandidate
+    int num_votes = 0;      ///< of Votes
     double votes = 0;       ///< log likelihood ratio of its displacement votes
     double geometry = 0;    ///< the same of its inliers
     double sigmas = 0;      ///< votes in standard deviations of the null; 0 where there is no null
@@ -75,7 +76,8 @@ class PlaceFilter {
   /// Steps so close, or laps through one place, show the same place.
   static bool is_near(std::ptrdiff_t a, std::ptrdiff_t b, const KnownLoops& loops);
 
-  /// Of the candidates that show the place at `middle`, the one that is the match.
+  /// Of the candidates that show the place at `middle`, the one that is the match: it has most in
+  /// common with the frame, as far as it is probable.
   static std::optional<std::size_t> match_near(std::ptrdiff_t middle,
                                                const std::vector<Observed>& observed,
                                                const Belief& belief, const KnownLoops& loops);
