@@ -130,13 +130,15 @@ class Runner:
         for name, settings in WORLDS.items():
             yield name, world_command(settings)
 
+    def call(self, *arguments):
+        subprocess.run([self.loopbit, *arguments], check=True, stdout=subprocess.DEVNULL,
+                       stderr=subprocess.DEVNULL)
+
     def run(self, command, flags=()):
         """run.json of a run."""
         out = self.scratch / str(self.runs)
         self.runs += 1
-        subprocess.run([self.loopbit, *command, "--out", out, "--threads", "1", "--no-report",
-                        *flags],
-                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.call(*command, "--out", out, "--threads", "1", "--no-report", *flags)
         return json.loads((out / "run.json").read_text())
 
     def last_folder(self):
