@@ -68,9 +68,7 @@ PlaceSearch::Similar SearchedPlaces::most_similar(const BinaryContent& content,
     similar.places.push_back({static_cast<PlaceId>(key - keys_.begin()), rows.real(1)});
   }
   similar.is_all = found < number;
-  std::ranges::sort(similar.places, [](const Candidate& a, const Candidate& b) {
-    return a.similarity != b.similarity ? a.similarity > b.similarity : a.place < b.place;
-  });
+  std::ranges::sort(similar.places, &Candidate::comes_before);
   return similar;
 }
 

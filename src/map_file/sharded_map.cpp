@@ -226,9 +226,7 @@ ShardedMap::Similar ShardedMap::most_similar(const BinaryContent& content,
       }
     });
   }
-  std::ranges::sort(all.places, [](const Candidate& a, const Candidate& b) {
-    return a.similarity != b.similarity ? a.similarity > b.similarity : a.place < b.place;
-  });
+  std::ranges::sort(all.places, &Candidate::comes_before);
   if (all.places.size() <= number) return all;
   const double least = all.places[number - 1].similarity;
   const auto end = std::ranges::find_if(

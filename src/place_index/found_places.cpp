@@ -9,10 +9,6 @@
 namespace loopbit {
 namespace {
 
-bool is_before(const Candidate& a, const Candidate& b) {
-  return a.similarity != b.similarity ? a.similarity > b.similarity : a.place < b.place;
-}
-
 bool are_closer(const Candidate& a, const Candidate& b, int spacing) {
   return std::abs(a.place - b.place) < spacing;
 }
@@ -37,21 +33,21 @@ void FoundPlaces::raise_floor(const Candidate& candidate) {
   const auto first_close = std::find_if(apart_.begin(), apart_.end(), is_close);
   if (first_close != apart_.end()) {
     const bool is_only_one = std::none_of(first_close + 1, apart_.end(), is_close);
-    if (is_only_one && is_before(candidate, *first_close)) *first_close = candidate;
+    if (is_only_one && candidate.comes_before(*first_close)) *first_close = candidate;
   } else if (apart_.size() < max_candidates_) {
     apart_.push_back(candidate);
   } else {
-    const auto last = std::max_element(apart_.begin(), apart_.end(), is_before);
-    if (is_before(candidate, *last)) *last = candidate;
+    const auto last = std::ranges::max_element(apart_, &Candidate::comes_before);
+    if (candidate.comes_before(*last)) *last = candidate;
   }
   if (apart_.size() == max_candidates_) {
-    const Candidate last = *std::max_element(apart_.begin(), apart_.end(), is_before);
-    if (is_before(last, floor_)) floor_ = last;
+    const Candidate last = *std::ranges::max_element(apart_, &Candidate::comes_before);
+    if (last.comes_before(floor_)) floor_ = last;
   }
 }
 
 std::vector<Candidate> FoundPlaces::answer() && {
-  std::sort(found_.begin(), found_.end(), is_before);
+  std::ranges::sort(found_, &Candidate::comes_before);
   std::vector<Candidate> taken;
   for (const Candidate& candidate : found_) {
     if (taken.size() == max_candidates_) break;

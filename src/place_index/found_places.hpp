@@ -9,14 +9,14 @@
 namespace loopbit {
 
 /// Collects candidates in any order, and tells ever better which places can still matter to the
-/// answer. The order of candidates is: the more similar first; of equals, the earlier place.
+/// answer.
 ///
-/// The answer takes places in that order, and passes over those closer than `min_spacing` to one
-/// taken. So each place is either taken or within min_spacing - 1 of one that is taken and before
-/// it in the order. Of places at least 2 * min_spacing - 1 apart, no two can have the same one
-/// near. Hence max_candidates of them, whichever they are, have as many taken places at or before
-/// the last of them: what comes after that one, the floor, is not in the answer and keeps nothing
-/// out of it.
+/// The answer takes places in the order of Candidate::comes_before(), and passes over those closer
+/// than `min_spacing` to one taken. So each place is either taken or within min_spacing - 1 of one
+/// that is taken and before it in the order. Of places at least 2 * min_spacing - 1 apart, no two
+/// can have the same one near. Hence max_candidates of them, whichever they are, have as many taken
+/// places at or before the last of them: what comes after that one, the floor, is not in the answer
+/// and keeps nothing out of it.
 class FoundPlaces {
  public:
   explicit FoundPlaces(const RetrievalOptions& options);

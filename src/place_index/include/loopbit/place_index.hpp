@@ -24,6 +24,11 @@ struct Candidate {
   double similarity = 0;  ///< xi, the maximum over the tolerated shifts, in (0, 1]
 
   bool operator==(const Candidate&) const = default;
+
+  /// The order of candidates: the more similar first; of equals, the earlier place.
+  [[nodiscard]] bool comes_before(const Candidate& other) const {
+    return similarity != other.similarity ? similarity > other.similarity : place < other.place;
+  }
 };
 
 /// Upper bound of the distance between two centres M of contents, px.
