@@ -35,9 +35,9 @@ std::vector<Candidate> PlaceContents::query(const BinaryContent& content, PlaceI
   return similar;
 }
 
-/// Takes the most similar places in order, as PlaceIndex does. A place that is taken keeps at most
-/// 2 * (min_spacing - 1) others out. So there are enough if all may be taken; otherwise more are
-/// asked for.
+/// Takes the most similar places in order, as PlaceIndex does. A place that is taken keeps up to
+/// 2 * (min_spacing - 1) others out, about half of which are among the most similar ones. Where
+/// there are not enough, more are asked for.
 std::vector<Candidate> PlaceContents::query_map(const BinaryContent& content, PlaceId end,
                                                 const RetrievalOptions& options,
                                                 const PlaceTest& is_allowed) const {
@@ -51,8 +51,7 @@ std::vector<Candidate> PlaceContents::query_map(const BinaryContent& content, Pl
     return std::hypot(apart.x, apart.y) <= options.max_center_distance_px;
   };
   const auto most = static_cast<std::size_t>(options.max_candidates);
-  for (std::size_t number = most * static_cast<std::size_t>(2 * options.min_spacing - 1);;
-       number *= 2) {
+  for (std::size_t number = most * static_cast<std::size_t>(options.min_spacing);; number *= 2) {
     const PlaceSearch::Similar similar =
         memory_.most_similar(content, options.shift_tolerance_columns, number);
     std::vector<Candidate> taken;
