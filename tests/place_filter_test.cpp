@@ -447,6 +447,24 @@ TEST(PlaceFilter, PrepareChangesNoAnswerBeforeCommit) {
   EXPECT_NE(answers(), before);
 }
 
+TEST(PlaceFilter, TheMatchSharesMostWithTheFrameAsFarAsItIsProbable) {
+  const Belief belief{{{100, {0.5}}, {102, {0.3}}, {300, {0.1}}, {400, {0.1}}}};
+  const auto seen = [](std::ptrdiff_t step, int votes) {
+    return PlaceFilter::Observed{.candidate = {}, .step = step, .num_votes = votes};
+  };
+  // Times their probability: 10, 12, 0, 13, 20.
+  const std::vector<PlaceFilter::Observed> observed{seen(100, 20), seen(102, 40), seen(108, 500),
+                                                    seen(300, 130), seen(400, 200)};
+  KnownLoops loops;
+  const auto matched = [&] {
+    const auto match = PlaceFilter::match_near(100, observed, belief, loops);
+    return match ? observed[*match].step : -1;
+  };
+  EXPECT_EQ(matched(), 102) << "step 108 has most votes, but is not probable; 300 is elsewhere";
+  loops.add(300, 100);
+  EXPECT_EQ(matched(), 300) << "a lap through the same place";
+}
+
 TEST(PlaceFilter, LikeliestAreDifferentPathsInOrder) {
   const Belief belief{{{10, {0.2}}, {14, {0.1, 0.05}}, {40, {0, 0.3}}, {90, {0.001}}}};
   EXPECT_EQ(PlaceFilter::likeliest(belief, 0.01, 5), (std::vector<std::ptrdiff_t>{40, 10}));
