@@ -148,12 +148,12 @@ std::vector<BinaryContent> make_queries(const LongSequence& map, const LongSeque
   return queries;
 }
 
-/// What a detector asks the server for; see PlaceContents.
+/// What a detector asks the server for first; see PlaceContents.
 std::string search_for(const BinaryContent& query) {
   const std::string content = fmt::format("'{}'::binary_content", hex_of(query));
   return fmt::format(
       "SELECT place, similarity({0}, content::binary_content, 4) FROM place ORDER BY "
-      "content::binary_content <~> {0} FETCH FIRST 150 ROWS WITH TIES",
+      "content::binary_content <~> {0} FETCH FIRST 90 ROWS WITH TIES",
       content);
 }
 
