@@ -36,8 +36,8 @@ std::vector<Candidate> PlaceContents::query(const BinaryContent& content, PlaceI
 }
 
 /// Takes the most similar places in order, as PlaceIndex does. A place that is taken keeps up to
-/// 2 * (min_spacing - 1) others out, about half of which are among the most similar ones. Where
-/// there are not enough, more are asked for.
+/// 2 * (min_spacing - 1) others out, of which seldom more than half are among the most similar
+/// ones. Where that is not enough, more are asked for.
 std::vector<Candidate> PlaceContents::query_map(const BinaryContent& content, PlaceId end,
                                                 const RetrievalOptions& options,
                                                 const PlaceTest& is_allowed) const {
