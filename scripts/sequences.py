@@ -89,6 +89,13 @@ def call(*command, cwd=None):
         sys.exit(f"{' '.join(map(str, command))}\n{done.stdout}")
 
 
+def odometry_of(poses, out, *flags):
+    """Writes odometry that drifts, made from true poses, to the file `out`, and returns that."""
+    with open(out, "w") as file:
+        subprocess.run([ROOT / "scripts/make_odometry", poses, *flags], check=True, stdout=file)
+    return out
+
+
 class Runner:
     """Runs `loopbit` with one thread; keeps its folders in `scratch`."""
 
