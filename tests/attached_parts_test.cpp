@@ -140,28 +140,34 @@ std::vector<Match> matches(std::size_t first, std::size_t last) {
   return matches;
 }
 
-TEST(AttachedParts, MayBeAllThatTwoImagesShareUntilTheyAreKnown) {
+TEST(AttachedParts, MayBeAllThatTwoImagesShare) {
   Random random;
-  AttachedParts parts;
   const Features place = view_with_bonnet(random);
-  const std::size_t end = place.keypoints.size();
-  for (int i = 0; i < 4; ++i) {
-    const Features query = view_with_bonnet(random);
-    EXPECT_TRUE(parts.may_be_all(query, place, matches(200, end))) << "the bonnet";
-    EXPECT_FALSE(parts.may_be_all(query, place, matches(0, 200))) << "what moves";
-    EXPECT_FALSE(parts.may_be_all(place, place, matches(0, end))) << "from the same place";
-    note_view(parts, query);
-  }
   const Features query = view_with_bonnet(random);
-  EXPECT_FALSE(parts.may_be_all(query, place, matches(200, end))) << "would have been removed";
+  const std::size_t end = place.keypoints.size();
+  EXPECT_TRUE(AttachedParts::may_be_all(query, place, matches(200, end))) << "the bonnet";
+  EXPECT_FALSE(AttachedParts::may_be_all(query, place, matches(0, 200))) << "what moves";
+  EXPECT_FALSE(AttachedParts::may_be_all(place, place, matches(0, end))) << "from the same place";
 }
 
 TEST(AttachedParts, OfAnotherCameraAreNotTheSame) {
   Random random;
   Features place = view_with_bonnet(random);
   place.working_size_px.width += 1;
-  EXPECT_FALSE(AttachedParts().may_be_all(view_with_bonnet(random), place,
-                                          matches(200, place.keypoints.size())));
+  EXPECT_FALSE(AttachedParts::may_be_all(view_with_bonnet(random), place,
+                                         matches(200, place.keypoints.size())));
+}
+
+TEST(AttachedParts, AreKnownAfterFourViews) {
+  Random random;
+  AttachedParts parts;
+  const Features view = view_with_bonnet(random);
+  for (int i = 0; i < AttachedParts::kFirstViews; ++i) {
+    EXPECT_FALSE(parts.are_known(view.working_size_px)) << i;
+    note_view(parts, view_with_bonnet(random));
+  }
+  EXPECT_TRUE(parts.are_known(view.working_size_px));
+  EXPECT_FALSE(parts.are_known(view.working_size_px + cv::Size(1, 0)));
 }
 
 TEST(AttachedParts, AnotherWorkingSizeBeginsAnew) {

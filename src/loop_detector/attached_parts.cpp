@@ -15,11 +15,12 @@ namespace {
 
 constexpr int kReach_px = 2;
 
-/// A spot is attached if so many of the latest views, at most 16, have a feature there: all of 4,
-/// 6 of 8, 8 of 16. By chance one of 600 features lies within 2 px of a spot in a view of 640 x 480
-/// with a probability of 0.03, and in a crowded part of 0.15: in so many views then with at most
-/// 0.0014, however many views there are.
-int least_seen(int num_views) { return (num_views + 10) / 3; }
+/// A spot is attached if so many of the latest views, at most 16, have a feature there: all of the
+/// first 4, 6 of 8, 8 of 16. By chance one of 600 features lies within 2 px of a spot in a view of
+/// 640 x 480 with a probability of 0.03, and in a crowded part of 0.15: in so many views then with
+/// at most 0.0014, however many views there are.
+constexpr int least_seen(int num_views) { return (num_views + 10) / 3; }
+static_assert(least_seen(AttachedParts::kFirstViews) == AttachedParts::kFirstViews);
 
 /// Beside a part, half of the latest 6 views are enough: when the light changes, other features of
 /// it come up.
@@ -47,9 +48,8 @@ void AttachedParts::remove_from(Features& features) const {
 }
 
 bool AttachedParts::may_be_all(const Features& query, const Features& place,
-                               const std::vector<Match>& inliers) const {
-  const cv::Size& size_px = query.working_size_px;
-  if (are_known(size_px) || place.working_size_px != size_px) return false;
+                               const std::vector<Match>& inliers) {
+  if (place.working_size_px != query.working_size_px) return false;
   std::vector<Keypoint> unmoved;
   for (const Match& match : inliers) {
     const Keypoint& keypoint = query.keypoint(match.query);
@@ -87,11 +87,6 @@ std::size_t AttachedParts::index_of(int x_px, int y_px) const {
 
 AttachedParts::Views AttachedParts::views_at(const Keypoint& keypoint) const {
   return views_[index_of(rounded(keypoint.x_px), rounded(keypoint.y_px))];
-}
-
-/// At the beginning of a run, no spot can have been seen often enough.
-bool AttachedParts::are_known(const cv::Size& size_px) const {
-  return size_px == size_px_ && num_views_ >= least_seen(num_views_);
 }
 
 bool AttachedParts::is_attached(const Keypoint& keypoint) const {

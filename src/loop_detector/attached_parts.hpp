@@ -23,14 +23,22 @@ bool is_unmoved(const Keypoint& a, const Keypoint& b);
 /// feature after feature stays at the same spot while the view changes.
 class AttachedParts {
  public:
+  /// Of so many views at the beginning of a session, they are not known yet and left out of none.
+  static constexpr int kFirstViews = 4;
+
   void remove_from(BinaryContent& content) const;
   void remove_from(Features& features) const;
 
-  /// Whether parts that are not known yet may be all that two images share: most inliers stay where
-  /// they are, and they lie in less than half of the image. A camera that is where it was before
-  /// keeps all of the image in place.
-  [[nodiscard]] bool may_be_all(const Features& query, const Features& place,
-                                const std::vector<Match>& inliers) const;
+  /// Whether they are left out of images of that size.
+  [[nodiscard]] bool are_known(const cv::Size& size_px) const {
+    return size_px == size_px_ && num_views_ >= kFirstViews;
+  }
+
+  /// Whether they may be all that two images share, at least one of which still shows them: most
+  /// inliers stay where they are, and they lie in less than half of the image. A camera that is
+  /// where it was before keeps all of the image in place.
+  static bool may_be_all(const Features& query, const Features& place,
+                         const std::vector<Match>& inliers);
 
   /// Takes the memory that the next remember() needs, so that it does not throw.
   void reserve_next(const cv::Size& working_size_px);
@@ -48,7 +56,6 @@ class AttachedParts {
   [[nodiscard]] Views views_at(const Keypoint& keypoint) const;
   [[nodiscard]] bool is_attached(const Keypoint& keypoint) const;
   [[nodiscard]] bool shows_last_view(const std::vector<Keypoint>& keypoints) const;
-  [[nodiscard]] bool are_known(const cv::Size& size_px) const;
   void note(const std::vector<Keypoint>& keypoints);
   void find_parts(const std::vector<Keypoint>& keypoints);
 

@@ -465,10 +465,12 @@ class LoopDetector::Impl {
   /// many of the first `num_similar` candidates were removed.
   std::size_t remove_alike_by_attached_parts(Observation& seen, std::size_t num_similar) const {
     if (options_.decision.count_matches) return 0;
+    const bool are_known = attached_parts_.are_known(seen.features.working_size_px);
     const auto is_alike = [&](const VerifiedCandidate& v) {
+      const PlaceId place = v.candidate.place;
       return v.geometry &&
-             attached_parts_.may_be_all(seen.features, features(v.candidate.place, seen),
-                                        v.geometry->inliers);
+             (!are_known || places_.steps_into_session(place) < AttachedParts::kFirstViews) &&
+             AttachedParts::may_be_all(seen.features, features(place, seen), v.geometry->inliers);
     };
     const auto end = seen.verified.begin() + static_cast<std::ptrdiff_t>(num_similar);
     const auto removed = std::count_if(seen.verified.begin(), end, is_alike);

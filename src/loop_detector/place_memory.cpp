@@ -76,6 +76,14 @@ std::ptrdiff_t PlaceMemory::step_of(PlaceId place) const {
   return step - earlier_.back().step - kStepsBetweenSessions;
 }
 
+std::ptrdiff_t PlaceMemory::steps_into_session(PlaceId place) const {
+  const int session = origin(place).session;
+  if (place < 0) return new_place(place).step - new_sessions_.at(session).first_step;
+  const auto first = std::ranges::lower_bound(
+      earlier_, session, {}, [](const EarlierPlace& earlier) { return earlier.origin.session; });
+  return earlier_[static_cast<std::size_t>(place)].step - first->step;
+}
+
 std::optional<PlaceId> PlaceMemory::place_of(std::ptrdiff_t step) const {
   if (step < -kStepsOfSession) {
     const auto after = by_first_step_.upper_bound(step);

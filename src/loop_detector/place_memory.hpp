@@ -91,13 +91,15 @@ class PlaceMemory {
   /// Changes of view in other sessions.
   [[nodiscard]] std::ptrdiff_t earlier_steps() const { return earlier_steps_; }
 
-  /// The two below: place < session_begin().
+  /// The three below: place < session_begin().
   [[nodiscard]] const SessionFrame& origin(PlaceId place) const {
     return place < 0 ? new_place(place).origin : earlier_[static_cast<std::size_t>(place)].origin;
   }
   /// Where along the paths of all sessions it lies, counted in changes of view: negative, and far
   /// from any step of another session.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
+  /// The same, counted from the first place of its session. Logarithmic.
+  [[nodiscard]] std::ptrdiff_t steps_into_session(PlaceId place) const;
   /// The reverse: the first place of a step, if another session has it. Logarithmic.
   [[nodiscard]] std::optional<PlaceId> place_of(std::ptrdiff_t step) const;
 

@@ -74,6 +74,10 @@ std::ptrdiff_t Places::step_of(PlaceId place) const {
   return place < session_begin() ? memory_.step_of(place) : recent_view_.step_of(place);
 }
 
+std::ptrdiff_t Places::steps_into_session(PlaceId place) const {
+  return place < session_begin() ? memory_.steps_into_session(place) : recent_view_.step_of(place);
+}
+
 std::optional<PlaceId> Places::place_of(std::ptrdiff_t step) const {
   return step < 0 ? memory_.place_of(step) : recent_view_.place_of(step);
 }
