@@ -18,6 +18,7 @@
 #include "loopbit/surf.hpp"
 
 #include "map_support.hpp"
+#include "places.hpp"
 #include "test_support.hpp"
 
 namespace loopbit::test {
@@ -417,6 +418,26 @@ TEST_F(MapSession, ARobotInViewIsNoPlace) {
   drive_past(first, {0, 0});
   EXPECT_EQ(drive_past({100, 101, 102, 103, 104, 8, 9, 10, 11}, {6, 2}),
             (std::vector{8, 9, 10, 11}));
+}
+
+TEST_F(MapSession, StepsAreCountedFromTheBeginningOfEachSession) {
+  drive(0, 6);
+  drive(7, 9);
+  const Places places(fast_options(), std::make_shared<MapReader>(path("map.db")));
+  std::vector<std::ptrdiff_t> steps;
+  for (PlaceId place = 0; place < places.size(); ++place) {
+    steps.push_back(places.steps_into_session(place));
+  }
+  EXPECT_EQ(steps, (std::vector<std::ptrdiff_t>{0, 1, 2, 3, 4, 5, 6, 0, 1, 2}));
+}
+
+TEST_F(MapSession, StepsOfNewsAreCountedFromTheFirst) {
+  drive(0, 6);
+  const auto map = std::make_shared<GrowingMap>(path("map.db"), 7);
+  Places places(fast_options(), map);
+  map->reveal(3, false);
+  places.learn();
+  for (const PlaceId place : {-1, -2, -3}) EXPECT_EQ(places.steps_into_session(place), -1 - place);
 }
 
 TEST_F(MapSession, RemovedPlacesStayRemoved) {

@@ -98,7 +98,8 @@ class PlaceMemory {
   /// Where along the paths of all sessions it lies, counted in changes of view: negative, and far
   /// from any step of another session.
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
-  /// The same, counted from the first place of its session. Logarithmic.
+  /// The same, counted from the first place of its session that is left, or of news() from the
+  /// first that was news. Logarithmic.
   [[nodiscard]] std::ptrdiff_t steps_into_session(PlaceId place) const;
   /// The reverse: the first place of a step, if another session has it. Logarithmic.
   [[nodiscard]] std::optional<PlaceId> place_of(std::ptrdiff_t step) const;

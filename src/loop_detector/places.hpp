@@ -43,7 +43,7 @@ class Places {
   [[nodiscard]] std::optional<PlaceId> find(const SessionFrame& at) const;
 
   [[nodiscard]] std::ptrdiff_t step_of(PlaceId place) const;
-  /// Counted from the first place of its session that is left.
+  /// The same, counted from the beginning of its session; see PlaceMemory.
   [[nodiscard]] std::ptrdiff_t steps_into_session(PlaceId place) const;
   /// The first place of a step, if there is such a step.
   [[nodiscard]] std::optional<PlaceId> place_of(std::ptrdiff_t step) const;
