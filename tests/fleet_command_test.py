@@ -352,10 +352,13 @@ class FleetTest(CommandTest):
     def test_a_full_server_is_brought_up_to_date_later(self):
         address = self.new_town("filled")
         out = self.scratch / "second"
+        trigger = "FUNCTION public.fail() RETURNS trigger LANGUAGE plpgsql AS $$BEGIN {} END$$"
+        self.server.sql("filled", "CREATE " + trigger.format("RETURN new;"), "CREATE TRIGGER fail BEFORE INSERT ON "
+                        "loopbit.features EXECUTE FUNCTION public.fail()")
         with self.second_run(address, out) as run:
-            self.server.sql("filled", "CREATE FUNCTION public.fail() RETURNS trigger LANGUAGE plpgsql AS "
-                            "$$BEGIN RAISE 'disk full' USING ERRCODE = 'disk_full'; END$$", "CREATE TRIGGER fail "
-                            "BEFORE INSERT ON loopbit.features EXECUTE FUNCTION public.fail()")
+            # A function may be replaced although the stopped run has a transaction open; a trigger would wait for it.
+            self.server.sql("filled", "CREATE OR REPLACE "
+                            + trigger.format("RAISE 'disk full' USING ERRCODE = 'disk_full';"))
             run.send_signal(signal.SIGCONT)
             _, stderr = run.communicate()
         self.assertEqual(run.returncode, 0, stderr)
