@@ -16,7 +16,8 @@
 namespace loopbit::test {
 namespace {
 
-/// A frame of a path that alone is far from sure.
+/// A frame of a path that alone is far from sure. A revisit becomes likelier than not with the 13th
+/// of them, and sure with the 20th.
 constexpr Found kWeak{.votes = 20};
 
 /// Follows a path from step 100 with weak frames until the filter is sure; returns the frames that
@@ -71,12 +72,30 @@ TEST(LateLoops, AFrameThatDoesNotShowThePlaceIsNone) {
   Walk walk;
   const int first = walk.robot.frame;
   for (int i = 0; i < 40; ++i) {
-    // Frame 5 was not compared with the place, frame 6 speaks against it.
-    walk.see(i == 5 ? FoundAt{} : FoundAt{{100 + i, i == 6 ? Found{.votes = 0} : kWeak}});
+    // Frame 17 was not compared with the place, frame 18 speaks against it.
+    walk.see(i == 17 ? FoundAt{} : FoundAt{{100 + i, i == 18 ? Found{.votes = 0} : kWeak}});
   }
-  EXPECT_FALSE(walk.late.contains(first + 5));
-  EXPECT_FALSE(walk.late.contains(first + 6));
-  EXPECT_TRUE(walk.late.contains(first + 4));
+  EXPECT_FALSE(walk.late.contains(first + 17));
+  EXPECT_FALSE(walk.late.contains(first + 18));
+  EXPECT_TRUE(walk.late.contains(first + 16));
+}
+
+TEST(LateLoops, AFrameThatSeemedToBeSomewhereNewIsNone) {
+  Walk walk;
+  const int first = walk.robot.frame;
+  std::vector<double> elsewhere;
+  const auto see = [&](const FoundAt& found) {
+    elsewhere.push_back(walk.robot.look(found).belief.elsewhere());
+    walk.see(found);
+  };
+  for (int i = 0; i < 16; ++i) see({{100 + i, kWeak}});
+  ASSERT_TRUE(walk.at_once.empty());
+  for (int i = 16; i < 20; ++i) see({{100 + i, kByDay}});
+  ASSERT_GT(elsewhere[10], 0.6);
+  ASSERT_LT(elsewhere[14], 0.4);
+  for (int i = 0; i < 16; ++i) {
+    EXPECT_EQ(walk.late.contains(first + i), elsewhere[static_cast<std::size_t>(i)] <= 0.5) << i;
+  }
 }
 
 TEST(LateLoops, ALoopWhoseTwinWinsIsWithdrawn) {
@@ -85,15 +104,15 @@ TEST(LateLoops, ALoopWhoseTwinWinsIsWithdrawn) {
   // The way from 3000 looks much like that from 100, until it is seen by itself.
   for (int i = 0; i < 14; ++i) walk.see({{100 + i, {.votes = 28}}, {3000 + i, {.votes = 20}}});
   ASSERT_TRUE(walk.at_once.contains(first + 8));
-  ASSERT_TRUE(walk.late.contains(first + 4));
+  ASSERT_TRUE(walk.late.contains(first + 6));
   EXPECT_TRUE(walk.withdrawn.empty());
   for (int i = 14; i < 20; ++i) walk.see({{3000 + i, kByDay}, {100 + i, {.votes = 2}}});
-  for (const int frame : {first + 4, first + 8}) {
+  for (const int frame : {first + 6, first + 8}) {
     ASSERT_TRUE(walk.withdrawn.contains(frame)) << "one was found late, the other at once";
     EXPECT_EQ(walk.withdrawn.at(frame).matched_step, 100 + (frame - first));
   }
   EXPECT_EQ(walk.late.at(first + 8).matched_step, 3008) << "where it was instead";
-  EXPECT_EQ(walk.late.at(first + 4).matched_step, 104) << "a frame is late once";
+  EXPECT_EQ(walk.late.at(first + 6).matched_step, 106) << "a frame is late once";
 }
 
 TEST(LateLoops, ALoopIsNotWithdrawnWhereThePathEnds) {
@@ -108,11 +127,11 @@ TEST(LateLoops, ALoopIsNotWithdrawnWhereThePathEnds) {
 TEST(LateLoops, FramesOfOneViewShareTheAnswerOfTheirStep) {
   Walk walk;
   const int first = walk.robot.frame;
-  for (int i = 0; i < 10; ++i) {
+  for (int i = 0; i < 16; ++i) {
     walk.see({{100 + i, kWeak}});
     walk.see({{100 + i, kWeak}}, false);
   }
-  walk.see({{110, kByDay}});
+  walk.see({{116, kByDay}});
   ASSERT_FALSE(walk.late.empty());
   int of_repeats = 0;
   for (const auto& [frame, loop] : walk.late) {
@@ -125,8 +144,8 @@ TEST(LateLoops, FramesOfOneViewShareTheAnswerOfTheirStep) {
 
 TEST(LateLoops, FindChangesNothing) {
   Walk walk;
-  for (int i = 0; i < 8; ++i) walk.see({{100 + i, kWeak}});
-  const auto update = walk.robot.look({{108, kByDay}});
+  for (int i = 0; i < 16; ++i) walk.see({{100 + i, kWeak}});
+  const auto update = walk.robot.look({{116, kByDay}});
   const auto find = [&] {
     return walk.robot.late_loops.find(update, true, walk.robot.min_score, walk.robot.loops);
   };
@@ -144,27 +163,27 @@ TEST(LateLoops, RejectedAndRemovedPlacesAreNone) {
   for (const bool is_removed : {false, true}) {
     Walk walk;
     const int first = walk.robot.frame;
-    for (int i = 0; i < 8; ++i) walk.see({{100 + i, kWeak}});
+    for (int i = 0; i < 18; ++i) walk.see({{100 + i, kWeak}});
     ASSERT_TRUE(walk.at_once.empty());
     if (is_removed) {
-      walk.robot.late_loops.remove(105);
-      walk.robot.late_loops.remove(first + 3);
+      walk.robot.late_loops.remove(115);
+      walk.robot.late_loops.remove(first + 13);
     } else {
-      walk.robot.late_loops.reject(first + 3, 103, walk.robot.loops);
+      walk.robot.late_loops.reject(first + 13, 113, walk.robot.loops);
     }
-    for (int i = 8; i < 12; ++i) walk.see({{100 + i, kByDay}});
-    EXPECT_TRUE(walk.late.contains(first + 6));
-    EXPECT_FALSE(walk.late.contains(first + 3));
-    EXPECT_EQ(walk.late.contains(first + 5), !is_removed);
+    for (int i = 18; i < 22; ++i) walk.see({{100 + i, kByDay}});
+    EXPECT_TRUE(walk.late.contains(first + 16));
+    EXPECT_FALSE(walk.late.contains(first + 13));
+    EXPECT_EQ(walk.late.contains(first + 15), !is_removed);
   }
 }
 
 TEST(LateLoops, ItLooksBackABoundedWay) {
   Walk walk;
-  for (int i = 0; i < 8; ++i) walk.see({{100 + i, kWeak}});
-  for (int i = 0; i < 400; ++i) walk.see({{107, kWeak}}, false);
+  for (int i = 0; i < 16; ++i) walk.see({{100 + i, kWeak}});
+  for (int i = 0; i < 400; ++i) walk.see({{115, kWeak}}, false);
   const int end = walk.robot.frame;
-  for (int i = 8; i < 12; ++i) walk.see({{100 + i, kByDay}});
+  for (int i = 16; i < 20; ++i) walk.see({{100 + i, kByDay}});
   ASSERT_GT(walk.late.size(), 50U);
   for (const auto& [frame, loop] : walk.late) EXPECT_GE(frame, end - 128);
 }

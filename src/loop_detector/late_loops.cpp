@@ -15,7 +15,7 @@ namespace {
 constexpr std::size_t kWindowSteps = 32;
 /// A camera that stands still adds frames without end to a step.
 constexpr std::size_t kMaxFrames = 128;
-/// Below this a loop is more likely wrong than right.
+/// Below this a loop is more likely wrong than right, and a place more likely new than seen before.
 constexpr double kLikely = 0.5;
 
 double probability_near(const Belief& belief, std::ptrdiff_t step, const KnownLoops& loops) {
@@ -28,9 +28,9 @@ double probability_near(const Belief& belief, std::ptrdiff_t step, const KnownLo
 
 }  // namespace
 
-/// The answer for `frame` if `belief` is where the robot was.
-void LateLoops::judge(const Frame& frame, const Belief& belief, double min_probability,
-                      const KnownLoops& loops, Found& found) {
+/// The answer for `frame` of `step` if `belief` is where the robot was.
+void LateLoops::judge(const Frame& frame, const Step& step, const Belief& belief,
+                      double min_probability, const KnownLoops& loops, Found& found) {
   if (frame.loop) {
     const double probability = probability_near(belief, frame.loop->matched_step, loops);
     if (frame.by_itself || frame.was_withdrawn || probability >= kLikely) return;
@@ -47,6 +47,9 @@ void LateLoops::judge(const Frame& frame, const Belief& belief, double min_proba
   // A path tells roughly where the robot was. The frame itself must speak for its match.
   const PlaceFilter::Observed& matched = frame.observed[*match];
   if (matched.log_likelihood_ratio() <= 0) return;
+  // Any path is likelier than a return from anywhere, which counts 1 / N; so later frames would
+  // draw the surroundings of a loop into it. They may only confirm what was likely before them.
+  if (step.belief.elsewhere() > kLikely) return;
   found.late.push_back({.frame = frame.place,
                         .match = matched.candidate.place,
                         .matched_step = matched.step,
@@ -66,7 +69,7 @@ LateLoops::Found LateLoops::find(const PlaceFilter::Update& now, bool is_step,
     --step;
     if (is_earlier) belief = one_step_earlier(step->belief, *prior, *returns, belief);
     for (const Frame& frame : step->frames) {
-      judge(frame, belief, min_probability, loops, found);
+      judge(frame, *step, belief, min_probability, loops, found);
     }
     prior = is_earlier ? &step->prior : prior;
     returns = is_earlier ? &step->returns : returns;

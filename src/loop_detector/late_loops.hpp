@@ -13,9 +13,9 @@
 namespace loopbit {
 
 /// What a frame tells of those before it. Once the filter is sure of its path, the frames just
-/// before have matches, too, and a loop whose place turns out to have a twin has none: a backward
-/// pass of the PlaceFilter's model over the last few steps gives each of their frames the
-/// probability that all frames until now give it.
+/// before have matches, too, if they were likelier than not to be revisits by then, and a loop
+/// whose place turns out to have a twin has none: a backward pass of the PlaceFilter's model over
+/// the last few steps gives each of their frames the probability that all frames until now give it.
 ///
 /// Cost and memory have fixed bounds; see kWindowSteps and kMaxFrames in late_loops.cpp.
 class LateLoops {
@@ -78,8 +78,8 @@ class LateLoops {
     std::list<Frame> frames;
   };
 
-  static void judge(const Frame& frame, const Belief& belief, double min_probability,
-                    const KnownLoops& loops, Found& found);
+  static void judge(const Frame& frame, const Step& step, const Belief& belief,
+                    double min_probability, const KnownLoops& loops, Found& found);
   void forget_oldest();
 
   std::list<Step> steps_;
