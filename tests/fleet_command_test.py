@@ -300,6 +300,25 @@ class FleetTest(CommandTest):
             self.assertEqual(self.lines("map", command, self.server.address("forgetful")),
                              self.lines("map", command, self.file))
 
+    def server_timers(self):
+        """Of the server's connections: which, and the seconds until it runs out (proc(5), /proc/net/tcp)."""
+        established, clock_hz = "01", os.sysconf("SC_CLK_TCK")
+        for line in pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]:
+            _, local, _, state, _, timer, *_ = line.split()
+            if local.endswith(f":{self.server.port:04X}") and state == established:
+                kind, left = timer.split(":")
+                yield int(kind, 16), int(left, 16) / clock_hz
+
+    def test_the_server_soon_notices_that_a_robot_is_cut_off(self):
+        keepalive = 2
+        with self.second_run(self.new_town("lonely"), self.scratch / "second"):
+            timers = []
+            while not timers or any(kind != keepalive for kind, _ in timers):    # until it has sent all
+                timers = list(self.server_timers())
+        self.assertGreaterEqual(len(timers), 2)
+        for _, left_s in timers:
+            self.assertLessEqual(left_s, 30)
+
     def test_ctrl_c_does_not_wait_for_a_server(self):
         address = self.new_town("frozen")
         out = self.scratch / "second"
