@@ -301,7 +301,7 @@ class FleetTest(CommandTest):
                              self.lines("map", command, self.file))
 
     def server_timers(self):
-        """Of the server's connections: which, and the seconds until it runs out (proc(5), /proc/net/tcp)."""
+        """Of each connection of the server: the kind, and the seconds until it runs out (proc(5), /proc/net/tcp)."""
         established, clock_hz = "01", os.sysconf("SC_CLK_TCK")
         for line in pathlib.Path("/proc/net/tcp").read_text().splitlines()[1:]:
             _, local, _, state, _, timer, *_ = line.split()
@@ -311,9 +311,10 @@ class FleetTest(CommandTest):
 
     def test_the_server_soon_notices_that_a_robot_is_cut_off(self):
         keepalive = 2
-        with self.second_run(self.new_town("lonely"), self.scratch / "second"):
+        with self.second_run(self.new_town("lonely"), self.scratch / "second") as run:
             timers = []
-            while not timers or any(kind != keepalive for kind, _ in timers):    # until it has sent all
+            while not timers or any(kind != keepalive for kind, _ in timers):    # until all is sent
+                self.assertIsNone(run.poll())
                 timers = list(self.server_timers())
         self.assertGreaterEqual(len(timers), 2)
         for _, left_s in timers:
