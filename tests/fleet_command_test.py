@@ -309,6 +309,7 @@ class FleetTest(CommandTest):
                 kind, left = timer.split(":")
                 yield int(kind, 16), int(left, 16) / clock_hz
 
+    @repeats_when_sanitized
     def test_the_server_soon_notices_that_a_robot_is_cut_off(self):
         keepalive = 2
         with self.second_run(self.new_town("lonely"), self.scratch / "second") as run:

@@ -91,10 +91,11 @@ PGconn* connect(const Address& address) {
   return PQconnectdbParams(names.data(), values.data(), kExpandAddress);
 }
 
-/// A robot whose network or power is cut should not count as writing for two hours, the default of
-/// Linux, but for a minute.
-constexpr const char* kNoticeLostPeers =
-    "SET tcp_keepalives_idle = 30; SET tcp_keepalives_interval = 10; SET tcp_keepalives_count = 3";
+/// The tables are in a schema of their own. A robot whose network or power is cut should count as
+/// writing for a minute, not for the two hours that are the default of Linux.
+constexpr const char* kSettings =
+    "SET search_path = loopbit, pg_temp; SET tcp_keepalives_idle = 30; "
+    "SET tcp_keepalives_interval = 10; SET tcp_keepalives_count = 3";
 
 /// How soon an interrupt is noticed.
 constexpr std::chrono::milliseconds kSlice{20};
@@ -158,8 +159,7 @@ void Connection::begin() {
   PQsetNoticeProcessor(
       handle_.get(), [](void*, const char*) {}, nullptr);
   PQsetnonblocking(handle_.get(), 1);
-  execute("SET search_path = loopbit, pg_temp");
-  execute(kNoticeLostPeers);
+  execute(kSettings);
   if (access_ == MapDatabase::Access::read) {
     execute("SET default_transaction_read_only = on");
   } else {
