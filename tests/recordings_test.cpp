@@ -106,7 +106,7 @@ std::string read_motion(const recordings::Channel& channel, recordings::Bytes me
   return text;
 }
 
-/// The first byte of a seed says what the others are, see fuzz/fuzz_motion_message.cpp.
+/// The first byte of a seed says what the others are, see fuzz/fuzz.cpp.
 TEST(MotionMessages, CutAnywhereGiveAnErrorOrTheSame) {
   constexpr std::array kTypes = {"nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped",
                                  "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/CameraInfo"};
