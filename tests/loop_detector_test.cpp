@@ -364,7 +364,9 @@ TEST(LoopDetector, AMaskThatExcludesNothingChangesNothing) {
   const auto found = process_all(masked, images);
   for (std::size_t i = 0; i < images.size(); ++i) expect_same_answer(found[i], expected[i]);
   LoopDetector unmasked(fast_options());
-  unmasked.set_mask(cv::Mat1b::eye(images[0].size()));
+  cv::Mat1b left_half(images[0].size(), std::uint8_t{255});
+  left_half.colRange(left_half.cols / 2, left_half.cols) = 0;
+  unmasked.set_mask(left_half);
   unmasked.set_mask(cv::Mat());
   const auto without = process_all(unmasked, images);
   for (std::size_t i = 0; i < images.size(); ++i) expect_same_answer(without[i], expected[i]);
@@ -392,8 +394,12 @@ TEST(LoopDetector, FeaturesMustBeWhole) {
 
 TEST(LoopDetector, AMaskThatDoesNotFitIsRefused) {
   LoopDetector detector(fast_options());
-  expect_error(ErrorKind::option, {"0 everywhere"},
-               [&] { detector.set_mask(cv::Mat1b::zeros(240, 320)); });
+  cv::Mat1b mask(240, 320, std::uint8_t{0});
+  expect_error(ErrorKind::option, {"excludes the whole image", "0 of its 76800 pixels"},
+               [&] { detector.set_mask(mask); });
+  mask(9, 9) = 255;
+  expect_error(ErrorKind::option, {"excludes the whole image", "1 of its 76800 pixels"},
+               [&] { detector.set_mask(mask); });
   expect_error(ErrorKind::option, {"CV_16UC1", "8 bits"},
                [&] { detector.set_mask(cv::Mat1w::ones(240, 320)); });
   detector.set_mask(cv::Mat1b(120, 160, 255));

@@ -319,13 +319,16 @@ class LoopDetector::Impl {
                   fmt::format("The mask is of OpenCV type {}; give one of 8 bits, grey.",
                               cv::typeToString(mask.type())));
     }
-    if (cv::countNonZero(mask) == 0) {
-      throw Error(ErrorKind::option,
-                  "The mask is 0 everywhere, which excludes the whole image; pixels that count are "
-                  "not 0.");
-    }
     const cv::Mat1b copy = mask.clone();
-    excluded_ = excluded_pixels(copy);
+    const BinaryContent excluded = excluded_pixels(copy);
+    if (count(excluded) == kContentSide * kContentSide) {
+      throw Error(
+          ErrorKind::option,
+          fmt::format("The mask excludes the whole image: {} of its {} pixels are not 0, as "
+                      "those that count must be.",
+                      cv::countNonZero(copy), copy.total()));
+    }
+    excluded_ = excluded;
     mask_ = copy;
   }
 
