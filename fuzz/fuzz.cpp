@@ -4,6 +4,7 @@
 // scripts/fuzz sets it. A reader may give values or throw Error; anything else is a finding.
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
@@ -13,7 +14,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
@@ -50,19 +50,22 @@ void read_as_file(Bytes bytes, const char* extension, const Read& read) {
   namespace fs = std::filesystem;
   const std::string path =
       (fs::temp_directory_path() / fmt::format("loopbit_fuzz_{}{}", getpid(), extension)).string();
+  for (const char* suffix : {"-journal", "-wal", "-shm"}) fs::remove(path + suffix);
   std::ofstream(path, std::ios::binary)
       .write(reinterpret_cast<const char*>(bytes.data()), std::ssize(bytes));
-  const auto remove = [&] {
-    std::error_code error;
-    for (const char* suffix : {"", "-journal", "-wal", "-shm"}) fs::remove(path + suffix, error);
-  };
-  try {
-    read(path);
-  } catch (const Error&) {
-    remove();
-    throw;
-  }
-  remove();
+  read(path);
+}
+
+/// The first byte of a message says its type, by its lowest bits, and by the next one whether it is
+/// of ROS 1 or of ROS 2.
+template <std::size_t kNumTypes>
+recordings::Channel channel_of(std::uint8_t first,
+                               const std::array<const char*, kNumTypes>& types) {
+  static_assert(std::has_single_bit(kNumTypes));
+  return {.topic = "/topic",
+          .type = types.at(first % kNumTypes),
+          .encoding =
+              (first & kNumTypes) != 0 ? recordings::Encoding::ros1 : recordings::Encoding::cdr};
 }
 
 void fuzz_image_headers(Bytes bytes) {
@@ -75,16 +78,11 @@ void fuzz_image_list(Bytes bytes) {
   read_as_file(bytes, ".csv", [](const std::string& path) { (void)images::list_file(path); });
 }
 
-/// The first byte says what the others are: a raw or a compressed image, of ROS 2 or ROS 1.
 void fuzz_image_message(Bytes bytes) {
   constexpr std::array kTypes = {"sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"};
   if (bytes.empty()) return;
-  const bool is_ros1 = (bytes[0] & 2U) != 0;
-  const recordings::Channel channel{
-      .topic = "/camera",
-      .type = kTypes.at(bytes[0] & 1U),
-      .encoding = is_ros1 ? recordings::Encoding::ros1 : recordings::Encoding::cdr};
-  const auto message = recordings::read_image_message(channel, bytes.subspan(1), "An image");
+  const auto message =
+      recordings::read_image_message(channel_of(bytes[0], kTypes), bytes.subspan(1), "An image");
   (void)recordings::decode(message, kMegapixels, "An image");
 }
 
@@ -122,17 +120,12 @@ void fuzz_match_list(Bytes bytes) {
   read_as_file(bytes, ".csv", [](const std::string& path) { (void)read_match_list(path); });
 }
 
-/// The first byte says what the others are: odometry, a pose, transforms or a camera, of ROS 2 or
-/// ROS 1.
+/// Of a camera, the first byte also says whether its images are rectified.
 void fuzz_motion_message(Bytes bytes) {
   constexpr std::array kTypes = {"nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped",
                                  "tf2_msgs/msg/TFMessage", "sensor_msgs/msg/CameraInfo"};
   if (bytes.empty()) return;
-  const bool is_ros1 = (bytes[0] & 4U) != 0;
-  const recordings::Channel channel{
-      .topic = "/topic",
-      .type = kTypes.at(bytes[0] & 3U),
-      .encoding = is_ros1 ? recordings::Encoding::ros1 : recordings::Encoding::cdr};
+  const recordings::Channel channel = channel_of(bytes[0], kTypes);
   const Bytes message = bytes.subspan(1);
   if (!recordings::is_camera_info(channel)) {
     (void)recordings::read_transforms(channel, message, "A message");
@@ -184,7 +177,8 @@ void fuzz_truth(Bytes bytes) {
 
 using Reader = void (*)(Bytes);
 
-Reader reader_of_environment() {
+/// One for each folder of fuzz/corpus. Ends the program for another name.
+Reader reader_named(std::string_view name) {
   constexpr std::array kReaders = {std::pair("image_headers", &fuzz_image_headers),
                                    std::pair("image_list", &fuzz_image_list),
                                    std::pair("image_message", &fuzz_image_message),
@@ -199,23 +193,29 @@ Reader reader_of_environment() {
                                    std::pair("ros1_bag", &fuzz_ros1_bag),
                                    std::pair("ros2_database", &fuzz_ros2_database),
                                    std::pair("truth", &fuzz_truth)};
-  const char* name = std::getenv("LOOPBIT_FUZZ");
   for (const auto& [known, reader] : kReaders) {
-    if (name != nullptr && std::string_view(name) == known) return reader;
+    if (name == known) return reader;
   }
   fmt::print(stderr,
              "fuzz: there is no reader '{}'; LOOPBIT_FUZZ must be a folder of fuzz/corpus.\n",
-             name != nullptr ? name : "");
+             name);
   std::exit(2);
 }
+
+Reader read_input = nullptr;
 
 }  // namespace
 }  // namespace loopbit
 
+extern "C" int LLVMFuzzerInitialize(int* /*argc*/, char*** /*argv*/) {
+  const char* name = std::getenv("LOOPBIT_FUZZ");
+  loopbit::read_input = loopbit::reader_named(name != nullptr ? name : "");
+  return 0;
+}
+
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const loopbit::Reader kRead = loopbit::reader_of_environment();
   try {
-    kRead({data, size});
+    loopbit::read_input({data, size});
   } catch (const loopbit::Error&) {  // refused, as it should be
   }
   return 0;
