@@ -324,9 +324,10 @@ class LoopDetector::Impl {
     if (count(excluded) == kContentSide * kContentSide) {
       throw Error(
           ErrorKind::option,
-          fmt::format("The mask excludes the whole image: {} of its {} pixels are not 0, as "
-                      "those that count must be.",
-                      cv::countNonZero(copy), copy.total()));
+          fmt::format(
+              "The mask excludes the whole image. Pixels that count must not be 0; that is so "
+              "for {} of its {} pixels.",
+              cv::countNonZero(copy), copy.total()));
     }
     excluded_ = excluded;
     mask_ = copy;
