@@ -27,7 +27,7 @@ TIDY = "clang-tidy-14"
 CLANG = "clang++-14"
 # The static analyzer takes as long as all other checks, and a minute for a large test.
 # performance-unnecessary-value-param takes 40 % of the remaining time, for the functions of system
-# headers. The other checks listed here take more than half of it. Their faults are rare, are found by compilers,
+# headers. The other checks listed here take about half of it. Their faults are rare, are found by compilers,
 # too, or cannot occur in C++20.
 QUICK = ["--checks=-clang-analyzer-*,-performance-unnecessary-value-param,-bugprone-reserved-identifier,"
          "-bugprone-stringview-nullptr,-bugprone-suspicious-string-compare,-bugprone-multiple-statement-macro,"
