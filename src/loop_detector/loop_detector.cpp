@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -19,8 +18,8 @@
 
 #include "attached_parts.hpp"
 #include "candidate_filter.hpp"
-#include "companion.hpp"
-#include "image_parts.hpp"
+#include "candidate_finder.hpp"
+#include "exclusion_window.hpp"
 #include "late_loops.hpp"
 #include "place_filter.hpp"
 #include "places.hpp"
@@ -43,17 +42,6 @@ class Stopwatch {
   Clock::time_point start_ = Clock::now();
 };
 
-/// Paths worth looking at, even where they do not look alike.
-constexpr std::size_t kFollowedPaths = 3;
-constexpr double kMinFollowedProbability = 2e-3;
-/// On each, the places up to so many steps away.
-constexpr std::ptrdiff_t kFollowedReach = 2;
-/// Places that the robot has just left show what is common to its surroundings: so many of them are
-/// looked at.
-constexpr std::ptrdiff_t kPlacesJustLeft = 2;
-/// With odometry, so many times as many places are looked up, up to kMaxCandidates: those of other
-/// storeys may look more alike than the one where the robot is.
-constexpr int kLookAlikes = 10;
 /// A frame is compared with all its keypoints if the robot is at an earlier place with this
 /// probability, so that most new places cost little.
 constexpr double kWorthACloserLook = 0.1;
@@ -87,18 +75,6 @@ void check_whole(const Features& features) {
                   size_px.height));
 }
 
-/// The query's keypoints among inliers that moved between two images. Those that did not may be the
-/// robot itself, which is in view for ever.
-std::vector<Keypoint> moved_keypoints(const Features& query, const Features& place,
-                                      const std::vector<Match>& inliers) {
-  std::vector<Keypoint> moved;
-  for (const Match& match : inliers) {
-    const Keypoint& keypoint = query.keypoint(match.query);
-    if (!is_unmoved(keypoint, place.keypoint(match.place))) moved.push_back(keypoint);
-  }
-  return moved;
-}
-
 /// Of a keypoint in its image, 0 to 1.
 cv::Point2f relative_position(const Features& features, int index) {
   const Keypoint& keypoint = features.keypoint(index);
@@ -113,7 +89,9 @@ class LoopDetector::Impl {
   Impl(const LoopDetectorOptions& options, std::shared_ptr<MapStorage> map)
       : options_(validated(options)),
         places_(options_, std::move(map)),
+        window_(options_, places_),
         odometry_(options_, places_),
+        finder_(options_, places_, odometry_),
         filter_(places_),
         workspaces_([this] { return std::make_unique<Workspace>(options_, places_); }) {}
 
@@ -132,13 +110,8 @@ class LoopDetector::Impl {
     BinaryContent content;
     std::vector<Keypoint> all_keypoints;  ///< with those of what moves with the camera
     Features features;
-    RecentView::Look look;
-    PlaceTest is_allowed;  ///< as a candidate; empty = all places are
-    std::optional<Reach> reach;
-    std::vector<Candidate> too_far;        ///< of the most similar places, those out of reach
-    std::vector<Candidate> also_in_reach;  ///< the most similar of the others
-    int view_inliers = 0;                  ///< see inlier_worth()
-    PlaceId compared = -1;                 ///< the recent place that `work` compares it with
+    ExclusionWindow::View view;
+    FrameCandidates candidates;
     std::vector<VerifiedCandidate> verified;
     std::optional<VerifiedCandidate> best;  ///< of them
     std::vector<int> votes_just_left;       ///< see PlaceFilter::Steps
@@ -187,38 +160,31 @@ class LoopDetector::Impl {
   /// Its second half: finds the place that `seen` shows by its content and features.
   void recognise(Observation& seen, const AllowedPlaces& allowed, Detection& detection) const {
     Stopwatch stopwatch;
-    seen.look = look(seen);
-    const PlaceId end = first_recent_place(seen.look, detection.timestamp_s);
-    seen.is_allowed = filter_.test(allowed, seen.look.is_step);
-    seen.view_inliers = view_inliers(seen);
+    seen.view =
+        window_.view({seen.content, seen.features}, detection.timestamp_s, camera(), *seen.work);
     detection.times.verification_ms = stopwatch.lap_ms();
 
     // Step 2: the earlier places that look alike, and those where the robot is expected.
-    auto candidates = similar_places(detection, end, seen);
-    Belief prior =
-        place_filter_.predict(seen.look.is_step, odometry_.agreement_of_moves(detection.odometry));
-    // Where the robot is sure to be back, half of them are rivals enough.
-    const double revisit = 1 - prior.elsewhere();
-    if (revisit >= options_.decision.min_score) candidates.resize((candidates.size() + 1) / 2);
-    std::size_t num_similar = candidates.size();
-    candidates.insert(candidates.end(), seen.also_in_reach.begin(), seen.also_in_reach.end());
-    add_expected(seen, prior, end, candidates);
-    const std::size_t num_candidates = candidates.size();
-    add_just_left(seen, end, candidates);
+    const bool is_step = seen.view.look.is_step;
+    Belief prior = place_filter_.predict(is_step, odometry_.agreement_of_moves(detection.odometry));
+    seen.candidates = finder_.find({seen.content, seen.view, prior, detection.odometry},
+                                   filter_.test(allowed, is_step));
     detection.times.retrieval_ms = stopwatch.lap_ms();
 
     // Step 3: the one that features, geometry and the frames before agree on.
-    seen.closely = revisit >= kWorthACloserLook;
+    seen.closely = 1 - prior.elsewhere() >= kWorthACloserLook;
     CandidateVerifier::Query query = verified_query(seen);
-    query.may_match = [&](PlaceId place) { return is_candidate(place, end, seen); };
-    seen.verified = seen.work->candidates.verify(query, candidates, num_similar);
-    for (const VerifiedCandidate& v : std::span(seen.verified).subspan(num_candidates)) {
+    query.may_match = [&](PlaceId place) { return seen.candidates.may_match(place); };
+    seen.verified =
+        seen.work->candidates.verify(query, seen.candidates.places, seen.candidates.num_similar);
+    for (const VerifiedCandidate& v :
+         std::span(seen.verified).last(seen.candidates.num_just_left)) {
       seen.votes_just_left.push_back(v.votes.count);
     }
-    seen.verified.resize(num_candidates);
-    num_similar -= remove_alike_by_attached_parts(seen, num_similar);
-    decide(seen, std::move(prior), num_similar, end, detection);
-    report_unreachable(seen, end, detection);
+    seen.verified.resize(seen.verified.size() - seen.candidates.num_just_left);
+    remove_alike_by_attached_parts(seen);
+    decide(seen, std::move(prior), detection);
+    report_unreachable(seen, detection);
     report_earlier_frames(seen, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
   }
@@ -269,26 +235,27 @@ class LoopDetector::Impl {
     std::optional<Shortcuts::Next> shortcuts;
     if (detection.status == Status::loop) {
       const std::ptrdiff_t latest = places_.step_of(places_.size());
-      found.add(seen.look.is_step ? latest + 1 : latest, seen.best->step);
-      if (seen.reach) shortcuts = odometry_.shortcuts_with(detection, *seen.reach);
+      found.add(seen.view.look.is_step ? latest + 1 : latest, seen.best->step);
+      if (const auto& reach = seen.candidates.reach) {
+        shortcuts = odometry_.shortcuts_with(detection, *reach);
+      }
     }
     LateLoops::Next frame;
     if (!options_.decision.count_matches) {
       frame = LateLoops::prepare(seen.update, places_.size(), detection.status == Status::loop,
                                  places_.known_loops());
     }
-    PlaceFilter::Next next =
-        place_filter_.prepare(std::move(seen.update), seen.look.is_step, places_.known_loops());
+    PlaceFilter::Next next = place_filter_.prepare(std::move(seen.update), seen.view.look.is_step,
+                                                   places_.known_loops());
     const cv::Size working_size_px = seen.features.working_size_px;
-    add_place(seen.content, std::move(seen.features), seen.look, detection, image);
-    if (seen.look.is_step) filter_.note_change_of_view();
+    add_place(seen.content, std::move(seen.features), seen.view, detection, image);
+    if (seen.view.look.is_step) filter_.note_change_of_view();
     attached_parts_.remember(working_size_px, seen.all_keypoints);
-    latest_view_inliers_ = seen.view_inliers;
     places_.known_loops().take(found);
     if (shortcuts) odometry_.commit(std::move(*shortcuts));
     place_filter_.commit(std::move(next));
     if (options_.decision.count_matches) return;
-    late_loops_.commit(std::move(frame), seen.look.is_step, seen.changed);
+    late_loops_.commit(std::move(frame), seen.view.look.is_step, seen.changed);
     for (const LateLoops::Loop& loop : seen.changed.withdrawn) {
       places_.known_loops().remove(places_.step_of(loop.frame), loop.matched_step);
       odometry_.remove_shortcut(loop.frame - places_.session_begin());
@@ -403,7 +370,7 @@ class LoopDetector::Impl {
 
   /// The answer before there is any. Throws Error (kind input) for what cannot be used.
   [[nodiscard]] Detection unanswered(const Given& given) const {
-    check_time(given.timestamp_s);
+    window_.check_time(given.timestamp_s);
     check(given.odometry);
     return {.frame = size(),
             .timestamp_s = given.timestamp_s,
@@ -415,43 +382,20 @@ class LoopDetector::Impl {
     if (odometry) check_odometry(*odometry, fmt::format("The odometry of frame {}", size()));
   }
 
-  void check_time(std::optional<double> timestamp_s) const {
-    if (options_.exclusion.seconds <= 0) return;
-    if (!timestamp_s || !std::isfinite(*timestamp_s)) {
-      throw Error(ErrorKind::input,
-                  fmt::format("Frame {} has no usable timestamp, but exclusion.seconds is {}; give "
-                              "times, or set exclusion.frames in its place.",
-                              size(), options_.exclusion.seconds));
-    }
-    if (!times_s_.empty() && *timestamp_s < times_s_.back()) {
-      throw Error(ErrorKind::input,
-                  fmt::format("Frame {} has timestamp {} s, before the last one of {} s; give the "
-                              "frames in order of time.",
-                              size(), *timestamp_s, times_s_.back()));
-    }
-  }
-
   /// All of it or, where it throws, nothing.
   void add_place(const BinaryContent& content, Features features,
-                 const std::optional<RecentView::Look>& look, const Detection& detection,
+                 const std::optional<ExclusionWindow::View>& view, const Detection& detection,
                  const cv::Mat& image) {
     odometry_.reserve_next(detection.odometry.has_value());
-    // The time of a frame that nothing matches may be wrong, and would shut out those after it.
-    const double last_s =
-        times_s_.empty() ? -std::numeric_limits<double>::infinity() : times_s_.back();
-    times_s_.push_back(
-        detection.status == Status::unreadable ? last_s : detection.timestamp_s.value_or(0.0));
-    try {
-      places_.add(content, std::move(features), look, detection, image);
-    } catch (...) {
-      times_s_.pop_back();
-      throw;
-    }
+    window_.reserve_next();
+    places_.add(content, std::move(features), view ? std::optional(view->look) : std::nullopt,
+                detection, image);
+    window_.add(detection, view);
     odometry_.add(detection.odometry);
   }
 
   [[nodiscard]] CandidateVerifier::Query verified_query(const Observation& seen) const {
-    return {seen.features, seen.view_inliers, seen.closely, camera()};
+    return {seen.features, seen.view.inliers, seen.closely, camera()};
   }
 
   /// Null = not known.
@@ -465,10 +409,9 @@ class LoopDetector::Impl {
     attached_parts_.remove_from(seen.features);
   }
 
-  /// Places recorded before their session's attached parts were known still show them. Returns how
-  /// many of the first `num_similar` candidates were removed.
-  std::size_t remove_alike_by_attached_parts(Observation& seen, std::size_t num_similar) const {
-    if (options_.decision.count_matches) return 0;
+  /// Places recorded before their session's attached parts were known still show them.
+  void remove_alike_by_attached_parts(Observation& seen) const {
+    if (options_.decision.count_matches) return;
     const bool are_known = attached_parts_.are_known(seen.features.working_size_px);
     const auto is_alike = [&](const VerifiedCandidate& v) {
       const PlaceId place = v.candidate.place;
@@ -476,89 +419,10 @@ class LoopDetector::Impl {
              (!are_known || places_.steps_into_session(place) < AttachedParts::kFirstViews) &&
              AttachedParts::may_be_all(seen.features, features(place, seen), v.geometry->inliers);
     };
-    const auto end = seen.verified.begin() + static_cast<std::ptrdiff_t>(num_similar);
-    const auto removed = std::count_if(seen.verified.begin(), end, is_alike);
+    const auto similar = std::span(seen.verified).first(seen.candidates.num_similar);
+    seen.candidates.num_similar -=
+        static_cast<std::size_t>(std::ranges::count_if(similar, is_alike));
     std::erase_if(seen.verified, is_alike);
-    return static_cast<std::size_t>(removed);
-  }
-
-  /// How far back the view of a new frame reaches.
-  [[nodiscard]] RecentView::Look look(Observation& seen) const {
-    const RecentView& view = places_.recent_view();
-    const auto oldest = view.long_in_view();
-    const bool is_companion_left_out = oldest && leave_out_companion(seen, *oldest);
-    const bool is_step = places_.changes_view(seen.content);
-    return view.look(
-        places_.size(), is_step,
-        [&](PlaceId place) {
-          // A fixed window does not depend on the view, of which only the latest step is needed.
-          return !is_window_fixed() && is_in_view(shared_with(seen, place));
-        },
-        is_companion_left_out);
-  }
-
-  [[nodiscard]] bool is_in_view(const std::vector<Keypoint>& shared) const {
-    return std::ssize(shared) >= options_.exclusion.in_view_inliers;
-  }
-
-  /// The frame's keypoints that a recent place shows, too, elsewhere in the image.
-  [[nodiscard]] std::vector<Keypoint> shared_with(Observation& seen, PlaceId place) const {
-    const Verification& shared = compare(seen, place);
-    return moved_keypoints(seen.features, features(place, seen), shared.inliers);
-  }
-
-  /// Leaves out what the frame shares with a place that was in view long ago, unless that is most
-  /// of the image. Returns whether there is such a thing.
-  bool leave_out_companion(Observation& seen, PlaceId place) const {
-    if (is_window_fixed() || options_.decision.count_matches) return false;
-    const std::vector<Keypoint> shared = shared_with(seen, place);
-    if (!is_in_view(shared)) return false;
-    const BinaryContent pixels = companion_pixels(seen.features, shared);
-    if (count(pixels) == 0) return false;
-    clear(seen.content, pixels);
-    remove_features(seen.features, [&](const Keypoint& keypoint) {
-      return is_set(pixels, content_pixel(keypoint, seen.features.working_size_px));
-    });
-    seen.compared = -1;
-    return true;
-  }
-
-  /// See inlier_worth(). A frame that shows the same as the last step can recognise as much.
-  [[nodiscard]] int view_inliers(Observation& seen) const {
-    if (options_.decision.count_matches || places_.recent_view().empty()) return 0;
-    if (!seen.look.is_step) return latest_view_inliers_;
-    return compare(seen, places_.recent_view().latest_step()).distinct_inliers;
-  }
-
-  /// What a frame shares with a recent place.
-  const Verification& compare(Observation& seen, PlaceId place) const {
-    Workspace& work = *seen.work;
-    if (seen.compared != place) {
-      const Features& recent = features(place, seen);
-      work.verifier.match(seen.features, recent, work.verification);
-      work.verifier.find_geometry(seen.features, recent, work.verification, camera());
-      seen.compared = place;
-    }
-    return work.verification;
-  }
-
-  [[nodiscard]] bool is_window_fixed() const {
-    return options_.exclusion.frames > 0 || options_.exclusion.seconds > 0;
-  }
-
-  /// The end of the places that may be candidates: the exclusion window begins there.
-  [[nodiscard]] PlaceId first_recent_place(const RecentView::Look& look,
-                                           std::optional<double> timestamp_s) const {
-    const ExclusionOptions& exclusion = options_.exclusion;
-    PlaceId first = look.begin;
-    if (exclusion.frames > 0) first = places_.size() - exclusion.frames;
-    if (exclusion.seconds > 0) {
-      const auto recent =
-          std::upper_bound(times_s_.begin(), times_s_.end(), *timestamp_s - exclusion.seconds);
-      first = places_.session_begin() + static_cast<PlaceId>(recent - times_s_.begin());
-    }
-    return std::max(places_.session_begin(),
-                    std::min(first, places_.size() - exclusion.min_frames));
   }
 
   /// See RankedPlace::score.
@@ -567,107 +431,31 @@ class LoopDetector::Impl {
     return seen.update.belief.at(v.step);
   }
 
-  [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const {
-    return {place, similarity(content, places_.contents().content(place),
-                              options_.retrieval.shift_tolerance_columns)};
-  }
-
-  /// The places most similar to the frame. By odometry, only those in reach may match. The others
-  /// still show what wrong places have, and in their stead less similar ones may match, too. `end`:
-  /// of the candidates.
-  std::vector<Candidate> similar_places(const Detection& detection, PlaceId end,
-                                        Observation& seen) const {
-    RetrievalOptions retrieval = options_.retrieval;
-    if (detection.odometry) {
-      retrieval.max_candidates = std::min(kMaxCandidates, kLookAlikes * retrieval.max_candidates);
-    }
-    auto similar = places_.contents().query(seen.content, end, retrieval, seen.is_allowed);
-    if (!detection.odometry) return similar;
-    keep_in_reach(*detection.odometry, end, seen);
-    const auto most = static_cast<std::size_t>(options_.retrieval.max_candidates);
-    for (std::size_t i = 0; i < similar.size(); ++i) {
-      const bool in_reach = seen.is_allowed(similar[i].place);
-      if (i < most && !in_reach) seen.too_far.push_back(similar[i]);
-      if (i >= most && in_reach && seen.also_in_reach.size() < seen.too_far.size()) {
-        seen.also_in_reach.push_back(similar[i]);
-      }
-    }
-    similar.resize(std::min(most, similar.size()));
-    return similar;
-  }
-
-  /// `end`: of the candidates.
-  void keep_in_reach(const OdometryPose& odometry, PlaceId end, Observation& seen) const {
-    seen.reach.emplace(odometry_.reach(odometry));
-    seen.is_allowed = [this, end, &reach = *seen.reach,
-                       is_wanted = std::exchange(seen.is_allowed, {})](PlaceId place) {
-      return (!is_wanted || is_wanted(place)) &&
-             odometry_.chi2(reach, place, end) <= Reach::kMaxChi2;
-    };
-  }
-
-  static bool is_among(const std::vector<Candidate>& candidates, PlaceId place) {
-    return std::ranges::find(candidates, place, &Candidate::place) != candidates.end();
-  }
-
-  static bool is_candidate(PlaceId place, PlaceId end, const Observation& seen) {
-    return place < end && (!seen.is_allowed || seen.is_allowed(place));
-  }
-
-  /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
-  /// while.
-  void add_expected(const Observation& seen, const Belief& prior, PlaceId end,
-                    std::vector<Candidate>& candidates) const {
-    if (options_.decision.count_matches) return;
-    for (const std::ptrdiff_t middle :
-         PlaceFilter::likeliest(prior, kMinFollowedProbability, kFollowedPaths)) {
-      for (std::ptrdiff_t step = middle - kFollowedReach; step <= middle + kFollowedReach; ++step) {
-        const auto place = places_.place_of(step);
-        if (!place || !is_candidate(*place, end, seen)) continue;
-        if (is_among(candidates, *place)) continue;
-        const Candidate expected = candidate(*place, seen.content);
-        // Nothing is like a frame that could not be read.
-        if (expected.similarity > 0) candidates.push_back(expected);
-      }
-    }
-  }
-
-  /// The oldest places of the exclusion window that are out of view.
-  void add_just_left(const Observation& seen, PlaceId end,
-                     std::vector<Candidate>& candidates) const {
-    if (options_.decision.count_matches || places_.recent_view().empty()) return;
-    const auto in_view = static_cast<std::ptrdiff_t>(seen.look.far_step);
-    const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, places_.step_of(end));
-    for (std::ptrdiff_t step = first; step < std::min(first + kPlacesJustLeft, in_view); ++step) {
-      const auto place = places_.place_of(step);
-      if (place && *place >= end) candidates.push_back(candidate(*place, seen.content));
-    }
-  }
-
-  void decide(Observation& seen, Belief prior, std::size_t num_similar, PlaceId end,
-              Detection& detection) const {
+  void decide(Observation& seen, Belief prior, Detection& detection) const {
+    const FrameCandidates& candidates = seen.candidates;
     const DecisionOptions& decision = options_.decision;
     if (std::ranges::none_of(seen.verified, &VerifiedCandidate::may_match)) {
-      detection.status =
-          places_.contents().any_before(end) ? Status::no_similar_place : Status::no_earlier_place;
+      detection.status = places_.contents().any_before(candidates.end) ? Status::no_similar_place
+                                                                       : Status::no_earlier_place;
     }
     if (decision.count_matches) return decide_by_matches(seen, detection);
     const PlaceFilter::Steps steps{
-        .number = places_.steps_before(end),
+        .number = places_.steps_before(candidates.end),
         .may_be_at =
             [&](std::ptrdiff_t step) {
               const auto place = places_.place_of(step);
-              return place && is_candidate(*place, end, seen);
+              return place && candidates.may_match(*place);
             },
         .return_weight =
             [&](std::ptrdiff_t step) {
-              const auto place = seen.reach ? places_.place_of(step) : std::nullopt;
-              return place ? Reach::weight(odometry_.chi2(*seen.reach, *place, end)) : 1.0;
+              const auto place = candidates.reach ? places_.place_of(step) : std::nullopt;
+              if (!place) return 1.0;
+              return Reach::weight(odometry_.chi2(*candidates.reach, *place, candidates.end));
             },
-        .is_step = seen.look.is_step,
+        .is_step = seen.view.look.is_step,
         .votes_just_left = seen.votes_just_left};
-    seen.update = place_filter_.update(std::move(prior), seen.verified, num_similar, steps,
-                                       places_.known_loops());
+    seen.update = place_filter_.update(std::move(prior), seen.verified, candidates.num_similar,
+                                       steps, places_.known_loops());
     if (!seen.update.match) return;
     report_match(seen.verified[*seen.update.match], seen, detection);
     detection.score = seen.update.probability;
@@ -680,17 +468,18 @@ class LoopDetector::Impl {
 
   /// Evidence of a place out of reach, where there is no loop: either that place looks like this
   /// one, or odometry is wrong.
-  void report_unreachable(Observation& seen, PlaceId end, Detection& detection) const {
+  void report_unreachable(Observation& seen, Detection& detection) const {
     constexpr std::size_t kLooks = 3;
     constexpr double kEvident = 0.5;
-    if (detection.status == Status::loop || seen.too_far.empty()) return;
-    seen.too_far.resize(std::min(kLooks, seen.too_far.size()));
+    std::vector<Candidate>& too_far = seen.candidates.too_far;
+    if (detection.status == Status::loop || too_far.empty()) return;
+    too_far.resize(std::min(kLooks, too_far.size()));
     const auto verified =
-        seen.work->candidates.verify(verified_query(seen), seen.too_far, seen.too_far.size());
+        seen.work->candidates.verify(verified_query(seen), too_far, too_far.size());
     const VerifiedCandidate* best = nullptr;
     double most = std::min(kEvident, options_.decision.min_score);
     for (const VerifiedCandidate& v : verified) {
-      const double probability = probability_alone(v, end);
+      const double probability = probability_alone(v, seen.candidates.end);
       if (probability < most) continue;
       most = probability;
       best = &v;
@@ -716,8 +505,8 @@ class LoopDetector::Impl {
   void report_earlier_frames(Observation& seen, Detection& detection) const {
     const DecisionOptions& decision = options_.decision;
     if (decision.count_matches) return;
-    seen.changed =
-        late_loops_.find(seen.update, seen.look.is_step, decision.min_score, places_.known_loops());
+    seen.changed = late_loops_.find(seen.update, seen.view.look.is_step, decision.min_score,
+                                    places_.known_loops());
     for (const LateLoops::Loop& loop : seen.changed.late) {
       detection.late_loops.push_back(late_loop(loop));
     }
@@ -772,11 +561,11 @@ class LoopDetector::Impl {
   BinaryContent excluded_;  ///< by the mask
   std::optional<CameraModel> camera_;
   Places places_;
-  mutable SessionOdometry odometry_;  ///< only process() asks for its reach, which is not const
-  std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
+  ExclusionWindow window_;
+  SessionOdometry odometry_;
+  CandidateFinder finder_;
   AttachedParts attached_parts_;
   CandidateFilter filter_;
-  int latest_view_inliers_ = 0;  ///< see inlier_worth()
   PlaceFilter place_filter_;
   LateLoops late_loops_;
   mutable Workspaces workspaces_;

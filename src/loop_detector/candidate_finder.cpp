@@ -1,0 +1,109 @@
+// SPDX-FileCopyrightText: 2026 The loopbit authors
+// SPDX-License-Identifier: MIT
+#include "candidate_finder.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "place_filter.hpp"
+
+namespace loopbit {
+namespace {
+
+/// Paths worth looking at, even where they do not look alike.
+constexpr std::size_t kFollowedPaths = 3;
+constexpr double kMinFollowedProbability = 2e-3;
+/// On each, the places up to so many steps away.
+constexpr std::ptrdiff_t kFollowedReach = 2;
+/// Places that the robot has just left show what is common to its surroundings: so many of them are
+/// looked at.
+constexpr std::ptrdiff_t kPlacesJustLeft = 2;
+/// With odometry, so many times as many places are looked up, up to kMaxCandidates: those of other
+/// storeys may look more alike than the one where the robot is.
+constexpr int kLookAlikes = 10;
+
+}  // namespace
+
+FrameCandidates CandidateFinder::find(const Query& query, PlaceTest is_allowed) const {
+  FrameCandidates found{.end = query.view.begin, .is_allowed = std::move(is_allowed)};
+  add_similar(query, found);
+  if (options_.decision.count_matches) return found;
+  add_expected(query, found);
+  add_just_left(query, found);
+  return found;
+}
+
+Candidate CandidateFinder::candidate(PlaceId place, const BinaryContent& content) const {
+  return {place, similarity(content, places_.contents().content(place),
+                            options_.retrieval.shift_tolerance_columns)};
+}
+
+/// By odometry, only those in reach may match. The others still show what wrong places have, and in
+/// their stead less similar ones may match, too.
+void CandidateFinder::add_similar(const Query& query, FrameCandidates& found) const {
+  RetrievalOptions retrieval = options_.retrieval;
+  const auto most = static_cast<std::size_t>(retrieval.max_candidates);
+  if (query.odometry) {
+    retrieval.max_candidates = std::min(kMaxCandidates, kLookAlikes * retrieval.max_candidates);
+  }
+  auto similar = places_.contents().query(query.content, found.end, retrieval, found.is_allowed);
+  std::vector<Candidate> also_in_reach;
+  if (query.odometry) {
+    keep_in_reach(*query.odometry, found);
+    for (std::size_t i = 0; i < similar.size(); ++i) {
+      const bool in_reach = found.is_allowed(similar[i].place);
+      if (i < most && !in_reach) found.too_far.push_back(similar[i]);
+      if (i >= most && in_reach && also_in_reach.size() < found.too_far.size()) {
+        also_in_reach.push_back(similar[i]);
+      }
+    }
+    similar.resize(std::min(most, similar.size()));
+  }
+  // Where the robot is sure to be back, half of them are rivals enough.
+  const bool is_back = 1 - query.prior.elsewhere() >= options_.decision.min_score;
+  if (is_back) similar.resize((similar.size() + 1) / 2);
+  found.num_similar = similar.size();
+  found.places = std::move(similar);
+  found.places.insert(found.places.end(), also_in_reach.begin(), also_in_reach.end());
+}
+
+void CandidateFinder::keep_in_reach(const OdometryPose& odometry, FrameCandidates& found) const {
+  found.reach = std::make_unique<Reach>(odometry_.reach(odometry));
+  found.is_allowed = [this, end = found.end, &reach = *found.reach,
+                      is_wanted = std::exchange(found.is_allowed, {})](PlaceId place) {
+    return (!is_wanted || is_wanted(place)) && odometry_.chi2(reach, place, end) <= Reach::kMaxChi2;
+  };
+}
+
+/// A robot that revisits keeps revisiting, even where a place does not look like itself for a
+/// while.
+void CandidateFinder::add_expected(const Query& query, FrameCandidates& found) const {
+  for (const std::ptrdiff_t middle :
+       PlaceFilter::likeliest(query.prior, kMinFollowedProbability, kFollowedPaths)) {
+    for (std::ptrdiff_t step = middle - kFollowedReach; step <= middle + kFollowedReach; ++step) {
+      const auto place = places_.place_of(step);
+      if (!place || !found.may_match(*place)) continue;
+      if (std::ranges::find(found.places, *place, &Candidate::place) != found.places.end()) {
+        continue;
+      }
+      const Candidate expected = candidate(*place, query.content);
+      // Nothing is like a frame that could not be read.
+      if (expected.similarity > 0) found.places.push_back(expected);
+    }
+  }
+}
+
+/// The oldest places of the exclusion window that are out of view.
+void CandidateFinder::add_just_left(const Query& query, FrameCandidates& found) const {
+  if (places_.recent_view().empty()) return;
+  const std::size_t before = found.places.size();
+  const auto in_view = static_cast<std::ptrdiff_t>(query.view.look.far_step);
+  const std::ptrdiff_t first = std::max<std::ptrdiff_t>(0, places_.step_of(found.end));
+  for (std::ptrdiff_t step = first; step < std::min(first + kPlacesJustLeft, in_view); ++step) {
+    const auto place = places_.place_of(step);
+    if (place && *place >= found.end) found.places.push_back(candidate(*place, query.content));
+  }
+  found.num_just_left = found.places.size() - before;
+}
+
+}  // namespace loopbit
