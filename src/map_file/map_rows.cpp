@@ -4,172 +4,20 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
-#include <libdeflate.h>
 
 #include "loopbit/error.hpp"
 
 #include "map_schema.hpp"
+#include "row_values.hpp"
 
 namespace loopbit {
 namespace {
-
-// The encoding of values, as in docs/format.md. All numbers are little-endian.
-
-static_assert(std::endian::native == std::endian::little, "the file's numbers are little-endian");
-static_assert(sizeof(Keypoint) == 4 * sizeof(float));
-static_assert(std::is_trivially_copyable_v<Keypoint>);
-
-/// Working width and height, features with a dark blob, features.
-using Header = std::array<std::int32_t, 4>;
-
-/// See SurfOptions::fields().
-constexpr std::int32_t kMaxKeypoints = 10000;
-
-bool is_sane(const Header& header) {
-  const auto [width, height, num_dark, size] = header;
-  const auto is_side = [](std::int32_t side) { return side >= 0 && side <= kMaxWorkingSide_px; };
-  const bool has_image = size == 0 || (width > 0 && height > 0);
-  return is_side(width) && is_side(height) && has_image && size >= 0 && size <= kMaxKeypoints &&
-         num_dark >= 0 && num_dark <= size;
-}
-
-bool is_sane(const Keypoint& keypoint) {
-  const auto is_in_reach = [](float px) { return std::abs(px) <= kMaxWorkingSide_px; };  // no NaN
-  return is_in_reach(keypoint.x_px) && is_in_reach(keypoint.y_px) && is_in_reach(keypoint.scale) &&
-         std::isfinite(keypoint.angle_rad);
-}
-
-template <typename T>
-void copy_in(std::span<const unsigned char>& bytes, T* values, std::size_t number) {
-  if (number > 0) std::memcpy(values, bytes.data(), number * sizeof(T));
-  bytes = bytes.subspan(number * sizeof(T));
-}
-
-template <typename T>
-void copy_out(unsigned char*& bytes, const T* values, std::size_t number) {
-  if (number > 0) std::memcpy(bytes, values, number * sizeof(T));
-  bytes += number * sizeof(T);
-}
-
-/// zlib's CRC-32 of a sequence of values.
-class Checksum {
- public:
-  Checksum& add(std::int64_t value);
-  Checksum& add(double value);
-  Checksum& add(std::span<const unsigned char> bytes);
-  Checksum& add(std::string_view text);
-  Checksum& add(const SessionFrame& at);
-
-  [[nodiscard]] std::int64_t value() const { return value_; }
-
- private:
-  std::uint32_t value_ = 0;
-};
-
-Checksum& Checksum::add(std::span<const unsigned char> bytes) {
-  // Three times as fast as zlib: a map of a million places opens 0.2 s earlier.
-  if (!bytes.empty()) value_ = libdeflate_crc32(value_, bytes.data(), bytes.size());
-  return *this;
-}
-
-Checksum& Checksum::add(std::string_view text) {
-  return add(std::span(reinterpret_cast<const unsigned char*>(text.data()), text.size()));
-}
-
-Checksum& Checksum::add(std::int64_t value) {
-  return add(std::bit_cast<std::array<unsigned char, sizeof value>>(value));
-}
-
-Checksum& Checksum::add(double value) {
-  const double stored = value + 0.0;  // SQLite keeps -0.0 as 0.0
-  return add(std::bit_cast<std::array<unsigned char, sizeof stored>>(stored));
-}
-
-Checksum& Checksum::add(const SessionFrame& at) {
-  return add(std::int64_t{at.session}).add(std::int64_t{at.frame});
-}
-
-/// 16 bytes, plus 80 bytes per feature.
-std::vector<unsigned char> features_bytes(const Features& features) {
-  const std::size_t size = features.keypoints.size();
-  const Header header{features.working_size_px.width, features.working_size_px.height,
-                      static_cast<std::int32_t>(features.num_dark),
-                      static_cast<std::int32_t>(size)};
-  std::vector<unsigned char> bytes(sizeof header + size * (sizeof(Keypoint) + sizeof(Descriptor)));
-  unsigned char* end = bytes.data();
-  copy_out(end, header.data(), header.size());
-  copy_out(end, features.keypoints.data(), size);
-  copy_out(end, features.descriptors.data(), size);
-  return bytes;
-}
-
-/// None unless the bytes are features within the limits of SurfOptions.
-std::optional<Features> features_from(std::span<const unsigned char> bytes) {
-  Header header{};
-  if (bytes.size() < sizeof header) return std::nullopt;
-  copy_in(bytes, header.data(), header.size());
-  if (!is_sane(header)) return std::nullopt;
-  const auto size = static_cast<std::size_t>(header[3]);
-  if (bytes.size() != size * (sizeof(Keypoint) + sizeof(Descriptor))) return std::nullopt;
-  Features features;
-  features.working_size_px = {header[0], header[1]};
-  features.num_dark = static_cast<std::size_t>(header[2]);
-  features.keypoints.resize(size);
-  features.descriptors.resize(size);
-  copy_in(bytes, features.keypoints.data(), size);
-  copy_in(bytes, features.descriptors.data(), size);
-  const auto& keypoints = features.keypoints;
-  if (!std::all_of(keypoints.begin(), keypoints.end(),
-                   [](const Keypoint& keypoint) { return is_sane(keypoint); })) {
-    return std::nullopt;
-  }
-  // Kernels are made for -127 to 127.
-  for (const Descriptor& descriptor : features.descriptors) {
-    if (std::ranges::count(descriptor, std::int8_t{-128}) != 0) return std::nullopt;
-  }
-  return features;
-}
-
-/// The first three rows of a pose, then the upper triangle of its covariance, row by row.
-using PoseNumbers = std::array<double, 12 + 21>;
-
-PoseNumbers pose_numbers(const cv::Matx44d& pose, const cv::Matx66d& covariance) {
-  PoseNumbers numbers{};
-  double* end = std::copy_n(pose.val, 12, numbers.begin());
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column) *end++ = covariance(row, column);
-  }
-  return numbers;
-}
-
-std::span<const unsigned char> bytes_of(const PoseNumbers& numbers) {
-  return {reinterpret_cast<const unsigned char*>(numbers.data()), sizeof numbers};
-}
-
-/// None unless the bytes are those of pose_numbers().
-std::optional<Motion> motion_from(std::span<const unsigned char> bytes) {
-  PoseNumbers numbers{};
-  if (bytes.size() != sizeof numbers) return std::nullopt;
-  copy_in(bytes, numbers.data(), numbers.size());
-  Motion motion;
-  std::copy_n(numbers.begin(), 12, motion.T_from_to.val);
-  const double* next = &numbers[12];
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column) {
-      motion.covariance(row, column) = motion.covariance(column, row) = *next++;
-    }
-  }
-  return motion;
-}
 
 /// After an unreadable page, this many keys are tried to find the next readable one: ten in
 /// sequence, then in steps that grow to 100, over 51,000 keys in all. A leaf page of contents has
@@ -222,60 +70,9 @@ void for_each_row(const MapDatabase& database, const std::string& table, const s
   damage.add(fmt::format("{} {} and after: the file cannot be read", table, damaged_from));
 }
 
-bool has_checksum(const SqlStatement& row, int column, const Checksum& checksum) {
-  return row.integer(column) == checksum.value();
+bool has_checksum(const SqlStatement& row, int column, std::int64_t checksum) {
+  return row.integer(column) == checksum;
 }
-
-Checksum checksum_of(const MapSession& s) {
-  return Checksum()
-      .add(std::int64_t{s.session})
-      .add(s.frames)
-      .add(std::string_view(s.uid))
-      .add(std::string_view(s.name))
-      .add(std::string_view(s.started))
-      .add(std::string_view(s.loopbit))
-      .add(std::string_view(s.options));
-}
-
-Checksum checksum_of(const MapPlace& place) {
-  return Checksum()
-      .add(place.at)
-      .add(place.timestamp_s.value_or(0.0))
-      .add(content_bytes(place.content));
-}
-
-/// The order differs from that of features, so that features never pass for an image.
-Checksum checksum_of_image(std::span<const unsigned char> jpeg, const SessionFrame& at) {
-  return Checksum().add(jpeg).add(at);
-}
-
-Checksum checksum_of(const MapLoop& loop) {
-  return Checksum()
-      .add(loop.query)
-      .add(loop.match)
-      .add(loop.score)
-      .add(loop.similarity)
-      .add(std::int64_t{loop.matches})
-      .add(std::int64_t{loop.inliers});
-}
-
-/// The match comes before the query, so that neither passes for the other.
-Checksum checksum_of_rejected(const MapLoop& loop) {
-  MapLoop swapped = loop;
-  std::swap(swapped.query, swapped.match);
-  return checksum_of(swapped);
-}
-
-/// As of images, the order tells it from a place.
-Checksum checksum_of(const MapOdometry& odometry, std::span<const unsigned char> pose) {
-  return Checksum().add(pose).add(odometry.at).add(odometry.timestamp_s.value_or(0.0));
-}
-
-Checksum checksum_of(const MapLoopPose& pose, std::span<const unsigned char> bytes) {
-  return Checksum().add(bytes).add(pose.query).add(pose.match).add(to_string(pose.measured.known));
-}
-
-Checksum checksum_of_linked(int session) { return Checksum().add(std::int64_t{session}); }
 
 /// -1 for values that do not fit: we never write these, and the checksum will differ.
 int narrow(std::int64_t value) {
@@ -299,7 +96,7 @@ std::string loop_columns(const std::string& table) {
          "checksum";
 }
 
-using LoopChecksum = Checksum (*)(const MapLoop&);
+using LoopChecksum = std::int64_t (*)(const MapLoop&);
 
 /// None, with a clause in `damage`, if it is damaged.
 std::optional<MapLoop> loop_in(const SqlStatement& row, const std::string& table, std::int64_t key,
@@ -368,14 +165,14 @@ std::string insertion_of_loop(const std::string& table) {
       table);
 }
 
-void write_loop(SqlStatement& row, const MapLoop& loop, const Checksum& checksum) {
+void write_loop(SqlStatement& row, const MapLoop& loop, std::int64_t checksum) {
   bind_frame(row, 1, loop.query);
   bind_frame(row, 3, loop.match);
   row.bind(5, loop.score);
   row.bind(6, loop.similarity);
   row.bind(7, std::int64_t{loop.matches});
   row.bind(8, std::int64_t{loop.inliers});
-  row.bind(9, checksum.value());
+  row.bind(9, checksum);
   row.run();
 }
 
@@ -396,16 +193,6 @@ void mark_linked(const MapDatabase& database, std::vector<MapSession>& sessions,
 }
 
 }  // namespace
-
-std::span<const unsigned char> content_bytes(const BinaryContent& content) {
-  return {reinterpret_cast<const unsigned char*>(content.rows.data()), sizeof content.rows};
-}
-
-bool read_content(std::span<const unsigned char> bytes, BinaryContent& content) {
-  if (bytes.size() != sizeof content.rows) return false;
-  std::memcpy(content.rows.data(), bytes.data(), bytes.size());
-  return true;
-}
 
 KeyRange places_of(const MapDatabase& database, int session) {
   return {.first = database.place_key({session, 0}, 0),
@@ -599,7 +386,7 @@ namespace {
 std::optional<Features> checked_features(const SqlStatement& row, int column,
                                          const SessionFrame& at) {
   const auto bytes = row.bytes(column);
-  if (!has_checksum(row, column + 1, Checksum().add(at).add(bytes))) return std::nullopt;
+  if (!has_checksum(row, column + 1, checksum_of_features(bytes, at))) return std::nullopt;
   return features_from(bytes);
 }
 
@@ -701,7 +488,7 @@ void RowWriter::write(const MapSession& session) {
   session_->bind(5, std::string_view(session.loopbit));
   session_->bind(6, std::string_view(session.options));
   session_->bind(7, session.frames);
-  session_->bind(8, checksum_of(session).value());
+  session_->bind(8, checksum_of(session));
   session_->run();
 }
 
@@ -710,12 +497,12 @@ void RowWriter::write(const MapPlace& place, const Features& features) {
   bind_frame(*place_, 2, place.at);
   place.timestamp_s ? place_->bind(4, *place.timestamp_s) : place_->bind_null(4);
   place_->bind(5, content_bytes(place.content));
-  place_->bind(6, checksum_of(place).value());
+  place_->bind(6, checksum_of(place));
   place_->run();
   const std::vector<unsigned char> bytes = features_bytes(features);
   features_->bind(1, place.id);
   features_->bind(2, bytes);
-  features_->bind(3, Checksum().add(place.at).add(bytes).value());
+  features_->bind(3, checksum_of_features(bytes, place.at));
   features_->run();
 }
 
@@ -723,7 +510,7 @@ void RowWriter::write_image(const MapPlace& place, std::span<const unsigned char
   if (jpeg.empty()) return;
   image_->bind(1, place.id);
   image_->bind(2, jpeg);
-  image_->bind(3, checksum_of_image(jpeg, place.at).value());
+  image_->bind(3, checksum_of_image(jpeg, place.at));
   image_->run();
 }
 
@@ -739,7 +526,7 @@ void RowWriter::write(const MapOdometry& odometry) {
   bind_frame(*odometry_, 1, odometry.at);
   odometry.timestamp_s ? odometry_->bind(3, *odometry.timestamp_s) : odometry_->bind_null(3);
   odometry_->bind(4, bytes_of(numbers));
-  odometry_->bind(5, checksum_of(odometry, bytes_of(numbers)).value());
+  odometry_->bind(5, checksum_of(odometry, bytes_of(numbers)));
   odometry_->run();
 }
 
@@ -750,13 +537,13 @@ void RowWriter::write(const MapLoopPose& pose) {
   bind_frame(*relative_pose_, 3, pose.match);
   relative_pose_->bind(5, to_string(pose.measured.known));
   relative_pose_->bind(6, bytes_of(numbers));
-  relative_pose_->bind(7, checksum_of(pose, bytes_of(numbers)).value());
+  relative_pose_->bind(7, checksum_of(pose, bytes_of(numbers)));
   relative_pose_->run();
 }
 
 void RowWriter::write_linked(int session) {
   linked_->bind(1, std::int64_t{session});
-  linked_->bind(2, checksum_of_linked(session).value());
+  linked_->bind(2, checksum_of_linked(session));
   linked_->run();
 }
 

@@ -15,7 +15,6 @@
 #include <unordered_set>
 #include <vector>
 
-#include "loopbit/binary_content.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/map_database.hpp"
 #include "loopbit/map_file.hpp"
@@ -44,11 +43,6 @@ struct KeyRange {
   std::int64_t first = 1;
   std::int64_t last = std::numeric_limits<std::int64_t>::max() - 1;
 };
-
-/// The 512 bytes of `content`, valid as long as it is: 64 rows of 64 bits.
-std::span<const unsigned char> content_bytes(const BinaryContent& content);
-/// False, and `content` unchanged, unless there are 512 bytes.
-bool read_content(std::span<const unsigned char> bytes, BinaryContent& content);
 
 /// Throws Error (kind input) if there are `clauses`: a damaged map is neither continued nor copied.
 void refuse_damaged(const std::string& path, const std::vector<std::string>& clauses);

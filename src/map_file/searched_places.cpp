@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "row_values.hpp"
+
 namespace loopbit {
 namespace {
 
