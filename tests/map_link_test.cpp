@@ -7,7 +7,10 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 
+#include "loopbit/gray_image.hpp"
 #include "loopbit/image_source.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_tools.hpp"
@@ -172,29 +175,59 @@ TEST_F(MapLink, NeedsAMapThatNobodyWrites) {
   expect_error(ErrorKind::output, {"map.db", "being written"}, [&] { link_map(path("map.db")); });
 }
 
-using RealMapLink = MapLink;
+class RealMapLink : public MapLink {
+ protected:
+  using Change = std::function<void(cv::Mat& image)>;
 
-TEST_F(RealMapLink, TwoWalksThroughACorridor) {
-  LOOPBIT_NEEDS_DATA("corridor_loop");
-  const auto walk = [&](const std::string& name, int first, int last) {
-    const auto source = open_source((*data_dir() / "corridor_loop/images").string());
+  /// A session with some images of a real sequence.
+  void walk(const std::string& name, const std::string& images, int first, int last,
+            const Change& change = {}) const {
+    const auto source = open_source((*data_dir() / images).string());
     const auto map = std::make_shared<MapWriter>(path(name), LoopDetectorOptions{}, name);
     LoopDetector detector(LoopDetectorOptions{}, map);
     Frame frame;
     for (int i = 0; i <= last && source->next(frame); ++i) {
-      if (i >= first) detector.process(frame.image);
+      if (i < first) continue;
+      if (change) change(frame.image);
+      detector.process(frame.image);
     }
     map->finish();
-  };
-  walk("first.db", 0, 41);
-  walk("second.db", 42, 83);
-  merge_map(path("merged.db"), path("first.db"));
-  merge_map(path("merged.db"), path("second.db"));
+  }
+
+  void merge_both() const {
+    merge_map(path("merged.db"), path("first.db"));
+    merge_map(path("merged.db"), path("second.db"));
+  }
+};
+
+TEST_F(RealMapLink, TwoWalksThroughACorridor) {
+  LOOPBIT_NEEDS_DATA("corridor_loop");
+  walk("first.db", "corridor_loop/images", 0, 41);
+  walk("second.db", "corridor_loop/images", 42, 83);
+  merge_both();
   EXPECT_EQ(link_map(path("merged.db")).places, 42);
-  walk("first.db", 42, 83);
+  walk("first.db", "corridor_loop/images", 42, 83);
   const std::vector<MapLoop> expected = loops_between("first.db");
   EXPECT_GT(expected.size(), 35U);
   EXPECT_EQ(loops_between("merged.db"), expected);
+}
+
+// The first views of a session still show the robot, which is in those of the other one, too.
+TEST_F(RealMapLink, ARobotInViewIsNoPlace) {
+  LOOPBIT_NEEDS_DATA("gardens_point");
+  LOOPBIT_NEEDS_DATA("graf");
+  const cv::Mat robot = cv::imread((*data_dir() / "graf/img1.png").string(), cv::IMREAD_GRAYSCALE);
+  const auto attach = [&](cv::Mat& image) {
+    image = gray_image(image).clone();
+    const int height = image.rows / 4;
+    cv::Mat lowest = image.rowRange(image.rows - height, image.rows);
+    cv::resize(robot, lowest, lowest.size(), 0, 0, cv::INTER_AREA);
+  };
+  walk("first.db", "gardens_point/day_left", 0, 29, attach);
+  walk("second.db", "gardens_point/day_right", 100, 129, attach);
+  merge_both();
+  EXPECT_EQ(link_map(path("merged.db")).places, 30);
+  EXPECT_EQ(loops_between("merged.db").size(), 0U) << "of different parts of the campus";
 }
 
 }  // namespace

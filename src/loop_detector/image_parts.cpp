@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 
 namespace loopbit {
 namespace {
@@ -15,9 +16,10 @@ std::uint64_t column_bit(const cv::Point& pixel) {
   return std::uint64_t{1} << static_cast<unsigned>(pixel.x);
 }
 
-BinaryContent inverted(BinaryContent content) {
-  for (std::uint64_t& row : content.rows) row = ~row;
-  return content;
+BinaryContent inverted(const BinaryContent& content) {
+  BinaryContent result;
+  std::ranges::transform(content.rows, result.rows.begin(), std::bit_not{});
+  return result;
 }
 
 }  // namespace
@@ -42,19 +44,20 @@ void clear(BinaryContent& content, const BinaryContent& pixels) {
   for (std::size_t y = 0; y < content.rows.size(); ++y) content.rows[y] &= ~pixels.rows[y];
 }
 
-BinaryContent dilated(BinaryContent content, int reach) {
+BinaryContent dilated(const BinaryContent& content, int reach) {
+  BinaryContent result = content;
   for (int i = 0; i < reach; ++i) {
     BinaryContent wide;
-    for (std::size_t y = 0; y < content.rows.size(); ++y) {
-      const std::uint64_t row = content.rows[y];
+    for (std::size_t y = 0; y < result.rows.size(); ++y) {
+      const std::uint64_t row = result.rows[y];
       const std::uint64_t wide_row = row | row << 1U | row >> 1U;
       wide.rows[y] |= wide_row;
       if (y > 0) wide.rows[y - 1] |= wide_row;
-      if (y + 1 < content.rows.size()) wide.rows[y + 1] |= wide_row;
+      if (y + 1 < result.rows.size()) wide.rows[y + 1] |= wide_row;
     }
-    content = wide;
+    result = wide;
   }
-  return content;
+  return result;
 }
 
 BinaryContent closed(const BinaryContent& content) {

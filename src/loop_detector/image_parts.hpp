@@ -21,7 +21,7 @@ void set(BinaryContent& content, const cv::Point& pixel);
 void clear(BinaryContent& content, const BinaryContent& pixels);
 
 /// With all pixels at most `reach` rows and columns away.
-BinaryContent dilated(BinaryContent content, int reach);
+BinaryContent dilated(const BinaryContent& content, int reach);
 
 /// With the gaps between its pixels that are part of one thing: up to a tenth of the image.
 BinaryContent closed(const BinaryContent& content);

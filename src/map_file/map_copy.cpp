@@ -57,11 +57,12 @@ class MapCopy {
   }
 
   /// False if its session is not copied. `image`: may be empty.
-  bool copy_place(MapPlace place, const Features& features,
+  bool copy_place(const MapPlace& place, const Features& features,
                   const std::vector<unsigned char>& image) {
-    if (!renumber(place.at)) return false;
-    rows_.write(place, features);
-    rows_.write_image(place, image);
+    MapPlace copied = place;
+    if (!renumber(copied.at)) return false;
+    rows_.write(copied, features);
+    rows_.write_image(copied, image);
     return true;
   }
 
