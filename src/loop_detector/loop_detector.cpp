@@ -182,8 +182,9 @@ class LoopDetector::Impl {
       seen.votes_just_left.push_back(v.votes.count);
     }
     seen.verified.resize(seen.verified.size() - seen.candidates.num_just_left);
-    remove_alike_by_attached_parts(seen);
-    decide(seen, std::move(prior), detection);
+    const std::size_t num_similar =
+        seen.candidates.num_similar - remove_alike_by_attached_parts(seen);
+    decide(seen, std::move(prior), num_similar, detection);
     report_unreachable(seen, detection);
     report_earlier_frames(seen, detection);
     detection.times.verification_ms += stopwatch.lap_ms();
@@ -409,9 +410,10 @@ class LoopDetector::Impl {
     attached_parts_.remove_from(seen.features);
   }
 
-  /// Places recorded before their session's attached parts were known still show them.
-  void remove_alike_by_attached_parts(Observation& seen) const {
-    if (options_.decision.count_matches) return;
+  /// Places recorded before their session's attached parts were known still show them. Returns how
+  /// many of the similar candidates were removed.
+  std::size_t remove_alike_by_attached_parts(Observation& seen) const {
+    if (options_.decision.count_matches) return 0;
     const bool are_known = attached_parts_.are_known(seen.features.working_size_px);
     const auto is_alike = [&](const VerifiedCandidate& v) {
       const PlaceId place = v.candidate.place;
@@ -420,9 +422,9 @@ class LoopDetector::Impl {
              AttachedParts::may_be_all(seen.features, features(place, seen), v.geometry->inliers);
     };
     const auto similar = std::span(seen.verified).first(seen.candidates.num_similar);
-    seen.candidates.num_similar -=
-        static_cast<std::size_t>(std::ranges::count_if(similar, is_alike));
+    const auto removed = static_cast<std::size_t>(std::ranges::count_if(similar, is_alike));
     std::erase_if(seen.verified, is_alike);
+    return removed;
   }
 
   /// See RankedPlace::score.
@@ -431,7 +433,8 @@ class LoopDetector::Impl {
     return seen.update.belief.at(v.step);
   }
 
-  void decide(Observation& seen, Belief prior, Detection& detection) const {
+  void decide(Observation& seen, Belief prior, std::size_t num_similar,
+              Detection& detection) const {
     const FrameCandidates& candidates = seen.candidates;
     const DecisionOptions& decision = options_.decision;
     if (std::ranges::none_of(seen.verified, &VerifiedCandidate::may_match)) {
@@ -454,8 +457,8 @@ class LoopDetector::Impl {
             },
         .is_step = seen.view.look.is_step,
         .votes_just_left = seen.votes_just_left};
-    seen.update = place_filter_.update(std::move(prior), seen.verified, candidates.num_similar,
-                                       steps, places_.known_loops());
+    seen.update = place_filter_.update(std::move(prior), seen.verified, num_similar, steps,
+                                       places_.known_loops());
     if (!seen.update.match) return;
     report_match(seen.verified[*seen.update.match], seen, detection);
     detection.score = seen.update.probability;
