@@ -139,17 +139,24 @@ TEST(Neighbourhoods, AreThoseOfEachPair) {
 }
 
 TEST(InlierWorth, GrowsWithTheShareUpToTheFullOne) {
-  EXPECT_DOUBLE_EQ(inlier_worth(0.0, 0), 0);
-  EXPECT_DOUBLE_EQ(inlier_worth(0.025, 0), 0.5);
-  EXPECT_DOUBLE_EQ(inlier_worth(0.1, 0), 1);
-  EXPECT_DOUBLE_EQ(inlier_worth(0.9, 0), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.0, 1), 0);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.025, 1), 0.5);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.1, 1), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.9, 1.2), 1);
 }
 
-TEST(InlierWorth, FallsWithWhatTheViewSharesWithTheStepBefore) {
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 40), 1);
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 50), 0.8);
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 80), 0.5);
-  EXPECT_DOUBLE_EQ(inlier_worth(1, 600), 0.5) << "but never less than half";
+TEST(InlierWorth, IsThatOfEvennessWhereThatIsLess) {
+  EXPECT_DOUBLE_EQ(inlier_worth(0.9, 0.85), 1);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.9, 0.34), 0.4);
+  EXPECT_DOUBLE_EQ(inlier_worth(0.025, 0.34), 0.4);
+}
+
+TEST(ViewWorth, FallsWithWhatTheViewSharesWithTheStepBefore) {
+  EXPECT_DOUBLE_EQ(view_worth(0), 1);
+  EXPECT_DOUBLE_EQ(view_worth(40), 1);
+  EXPECT_DOUBLE_EQ(view_worth(50), 0.8);
+  EXPECT_DOUBLE_EQ(view_worth(80), 0.5);
+  EXPECT_DOUBLE_EQ(view_worth(600), 0.5) << "but never less than half";
 }
 
 TEST(CandidateGeometry, EvidenceIsDistinctInliersThatCountInFull) {
@@ -157,8 +164,12 @@ TEST(CandidateGeometry, EvidenceIsDistinctInliersThatCountInFull) {
                                    .inliers = std::vector<Match>(60),
                                    .distinct_inliers = 40,
                                    .inlier_worth = 0.5,
+                                   .view_worth = 0.8,
                                    .distinctness = 0.25};
-  EXPECT_DOUBLE_EQ(geometry.evidence(), 5);
+  EXPECT_DOUBLE_EQ(geometry.evidence(), 4);
+  EXPECT_DOUBLE_EQ(geometry.evidence(0.5), 4) << "a small map is no second reason to doubt them";
+  EXPECT_DOUBLE_EQ(geometry.evidence(0.25), 2);
+  EXPECT_DOUBLE_EQ(geometry.excess(0.25), -6);
 }
 
 }  // namespace

@@ -198,10 +198,10 @@ TEST(PathMotion, APathEndsMoreSeldomWhereEachStepCountsLess) {
 }
 
 TEST(PathMotion, APathThatLastedIsLeftMoreSeldom) {
-  EXPECT_NEAR(leave_probability(1, {.steps = 100, .independent = 100}), 1.0 / 200, 1e-12);
+  EXPECT_NEAR(leave_probability(1, {.steps = 100, .independent = 100}), 1.0 / 300, 1e-12);
   // At ten times the frame rate, ten times as many steps are worth as much.
-  EXPECT_NEAR(leave_probability(0.1, {.steps = 1000, .independent = 100}), 0.1 / (100 + 100 / 3.0),
-              1e-12);
+  EXPECT_NEAR(leave_probability(0.1, {.steps = 1000, .independent = 100}),
+              0.1 / (2 * 100 + 100 / 3.0), 1e-12);
 }
 
 /// That the robot moved by two steps of every path. Nothing is known of those before step 200.

@@ -19,8 +19,6 @@
 namespace loopbit::test {
 namespace {
 
-constexpr double kDegrees = 180 / std::numbers::pi;
-
 TEST(OdometryTest, DriftGrowsWithTheSquareRootOfTheDistance) {
   const OdometryDrift drift{.position_per_m = 0.01,
                             .rotation_deg_per_m = 1e-5,
@@ -40,7 +38,7 @@ TEST(OdometryTest, RotationMovesWhatIsFarAway) {
   for (int k = 0; k <= 100; ++k) track.add(OdometryPose{level_pose(0, k, 0)});
   const Motion motion = track.between(0, 100).value();
   const double turn = std::sqrt(motion.covariance(4, 4));
-  EXPECT_NEAR(turn * kDegrees, 0.1 * std::sqrt(10.0 * 100), 0.01);
+  EXPECT_NEAR(turn * 180 / std::numbers::pi, 0.1 * std::sqrt(10.0 * 100), 0.01);
   // The sum of independent turns, each times the rest of the way: a third of the variance.
   EXPECT_NEAR(std::sqrt(motion.covariance(0, 0)), turn * 100 / std::sqrt(3), 0.05);
 }

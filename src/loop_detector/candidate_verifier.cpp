@@ -14,6 +14,8 @@ namespace {
 /// An inlier counts fully if so many of the features around the inliers are inliers themselves. If
 /// only a door looks like another door, the walls around it do not match.
 constexpr double kFullShare = 0.1;
+/// The same for Evenness: its median at right places of a street.
+constexpr double kFullEvenness = 0.85;
 /// An inlier counts less if a view shares more distinct inliers than this with the one before, but
 /// at least half: a camera that hovers sees nearly all of it again.
 constexpr double kFullViewInliers = 40;
@@ -31,16 +33,17 @@ constexpr std::size_t kExpectedCloserLooks = 4;
 
 }  // namespace
 
-double inlier_worth(double explained_share, int view_inliers) {
-  double worth = std::sqrt(std::min(1.0, explained_share / kFullShare));
-  if (view_inliers > kFullViewInliers) {
-    worth *= std::max(kMinWorthInRichView, kFullViewInliers / view_inliers);
-  }
-  return worth;
+double inlier_worth(double explained_share, double evenness) {
+  return std::min({1.0, std::sqrt(explained_share / kFullShare), evenness / kFullEvenness});
+}
+
+double view_worth(int distinct_inliers) {
+  return std::clamp(kFullViewInliers / std::max(1, distinct_inliers), kMinWorthInRichView, 1.0);
 }
 
 struct CandidateVerifier::Frame {
   const Query& query;
+  Evenness evenness;
   std::vector<VerifiedCandidate> verified;
   std::vector<Spot> promising;  ///< where promising candidates stand
   std::vector<int> features;    ///< of the query: inliers of one of them, in order
@@ -71,7 +74,7 @@ CandidateVerifier::CandidateVerifier(const LoopDetectorOptions& options, const P
 std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
                                                          const std::vector<Candidate>& candidates,
                                                          std::size_t num_similar) {
-  Frame frame{query, {}, {}, {}};
+  Frame frame{query, Evenness(query.view, query.features), {}, {}, {}};
   frame.verified.reserve(candidates.size());
   for (const Candidate& c : candidates) {
     frame.verified.push_back(
@@ -90,9 +93,10 @@ std::vector<VerifiedCandidate> CandidateVerifier::verify(const Query& query,
 }
 
 void CandidateVerifier::complete(const Query& query, std::vector<VerifiedCandidate>& verified) {
+  const Evenness evenness(query.view, query.features);
   for (VerifiedCandidate& v : verified) {
     if (v.geometry) continue;
-    v.geometry = geometry_of(query, v.candidate.place, FirstLook{}, true);
+    v.geometry = geometry_of(query, evenness, v.candidate.place, FirstLook{}, true);
   }
 }
 
@@ -147,14 +151,17 @@ void CandidateVerifier::look_at_others(Frame& frame) {
 
 void CandidateVerifier::verify_in_full(Frame& frame, std::size_t i, bool even_if_chance) {
   VerifiedCandidate& v = frame.verified[i];
-  v.geometry = geometry_of(frame.query, v.candidate.place, looks_[i], even_if_chance);
+  v.geometry =
+      geometry_of(frame.query, frame.evenness, v.candidate.place, looks_[i], even_if_chance);
   if (v.geometry && v.geometry->excess() > 0) {
     frame.note_promising(spot_of(v), v.geometry->inliers);
   }
 }
 
 /// None where all matches together would be no more than chance, unless `even_if_chance`.
-std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& query, PlaceId place,
+std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& query,
+                                                                const Evenness& evenness,
+                                                                PlaceId place,
                                                                 const FirstLook& look,
                                                                 bool even_if_chance) {
   Verification& result = verification_;
@@ -164,12 +171,14 @@ std::optional<CandidateGeometry> CandidateVerifier::geometry_of(const Query& que
       .matches = static_cast<int>(result.matches.size()),
       .chance_inliers = chance_inliers(query.features, features, query.camera)};
   if (options_.decision.count_matches) return geometry;
-  const double most = geometry.matches * inlier_worth(1.0, query.view_inliers);
+  geometry.view_worth = view_worth(query.view.distinct_inliers);
+  const double most = geometry.matches * geometry.view_worth;
   if (most <= geometry.chance_inliers && !even_if_chance) return std::nullopt;
   verifier_.find_geometry(query.features, features, result, query.camera);
   geometry.inliers = result.inliers;
   geometry.distinct_inliers = result.distinct_inliers;
-  geometry.inlier_worth = inlier_worth(result.explained_share, query.view_inliers);
+  geometry.inlier_worth = inlier_worth(
+      result.explained_share, evenness.of(result.inliers, result.distinct_inliers, features));
   return geometry;
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -11,6 +12,7 @@
 
 #include "displacement_votes.hpp"
 #include "distinctness.hpp"
+#include "evenness.hpp"
 #include "places.hpp"
 
 namespace loopbit {
@@ -21,15 +23,17 @@ struct CandidateGeometry {
   std::vector<Match> inliers = {};
   int distinct_inliers = 0;
   double inlier_worth = 1;  ///< 0 to 1, see inlier_worth()
+  double view_worth = 1;    ///< 0 to 1, see view_worth()
   double distinctness = 1;  ///< 0 to 1, see distinctness()
   int chance_inliers = 8;   ///< see chance_inliers(); that of pixels
 
-  /// That it shows the same place, in distinct inliers that count in full.
-  [[nodiscard]] double evidence() const { return distinct_inliers * inlier_worth * distinctness; }
-  /// The part of `share` of it that is more than chance; negative below.
-  [[nodiscard]] double excess(double share = 1) const {
-    return share * evidence() - chance_inliers;
+  /// That it shows the same place, in distinct inliers that count in full. An inlier counts at most
+  /// `known`.
+  [[nodiscard]] double evidence(double known = 1) const {
+    return distinct_inliers * std::min(inlier_worth, known) * view_worth * distinctness;
   }
+  /// What of it is more than chance; negative below.
+  [[nodiscard]] double excess(double known = 1) const { return evidence(known) - chance_inliers; }
 };
 
 /// One candidate of one frame.
@@ -41,10 +45,13 @@ struct VerifiedCandidate {
   std::optional<CandidateGeometry> geometry = std::nullopt;  ///< if it may be more than chance
 };
 
-/// What one distinct inlier counts, 0 to 1. `explained_share`: see there. `view_inliers`: distinct
-/// inliers that the query shares with the change of view before, which is what can be recognised of
-/// it: the same number found elsewhere says less of a view that has more.
-double inlier_worth(double explained_share, int view_inliers);
+/// What one distinct inlier counts, 0 to 1, by the lesser of explained_share() and Evenness: both
+/// are low if only a part of the image looks like a part of the other.
+double inlier_worth(double explained_share, double evenness);
+
+/// What it counts, 0.5 to 1, in a view that shares so many distinct inliers with the change of view
+/// before: the same number found elsewhere says less of a view that has more.
+double view_worth(int distinct_inliers);
 
 /// Step 3 for the candidates of one frame. A first look matches the strongest keypoints of each and
 /// counts displacement votes; the few that it puts first are matched in full, with their geometry.
@@ -54,7 +61,7 @@ class CandidateVerifier {
  public:
   struct Query {
     const Features& features;
-    int view_inliers = 0;  ///< see inlier_worth()
+    const SharedView& view;
     bool closely = false;  ///< the first look matches all keypoints, not only the strongest
     const CameraModel* camera = nullptr;  ///< see epipolar_inliers()
     PlaceTest may_match = {};             ///< empty = all may; the others are only looked at once
@@ -81,8 +88,9 @@ class CandidateVerifier {
   void look_closer(Frame& frame, std::size_t first, std::size_t last, std::size_t most);
   void look_at_others(Frame& frame);
   void verify_in_full(Frame& frame, std::size_t i, bool even_if_chance);
-  std::optional<CandidateGeometry> geometry_of(const Query& query, PlaceId place,
-                                               const FirstLook& look, bool even_if_chance);
+  std::optional<CandidateGeometry> geometry_of(const Query& query, const Evenness& evenness,
+                                               PlaceId place, const FirstLook& look,
+                                               bool even_if_chance);
   [[nodiscard]] Spot spot_of(const VerifiedCandidate& candidate) const;
   [[nodiscard]] bool is_elsewhere(const Frame& frame, const VerifiedCandidate& candidate) const;
   void find_distinctness(Frame& frame) const;

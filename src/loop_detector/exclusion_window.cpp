@@ -85,7 +85,7 @@ ExclusionWindow::View ExclusionWindow::view(Image image, std::optional<double> t
                                             const CameraModel* camera, Workspace& work) const {
   Comparison comparison(image, places_, camera, work);
   const RecentView::Look found = look(comparison);
-  return {found, begin(found, timestamp_s), view_inliers(comparison, found.is_step)};
+  return {found, begin(found, timestamp_s), shared_view(comparison, found.is_step)};
 }
 
 bool ExclusionWindow::is_in_view(const std::vector<Keypoint>& shared) const {
@@ -133,10 +133,11 @@ PlaceId ExclusionWindow::begin(const RecentView::Look& look,
 }
 
 /// A frame that shows the same as the last step can recognise as much.
-int ExclusionWindow::view_inliers(Comparison& comparison, bool is_step) const {
-  if (options_.decision.count_matches || places_.recent_view().empty()) return 0;
-  if (!is_step) return latest_inliers_;
-  return comparison.with(places_.recent_view().latest_step()).distinct_inliers;
+SharedView ExclusionWindow::shared_view(Comparison& comparison, bool is_step) const {
+  if (options_.decision.count_matches || places_.recent_view().empty()) return {};
+  if (!is_step) return latest_shared_;
+  const Verification& shared = comparison.with(places_.recent_view().latest_step());
+  return {shared.distinct_inliers, count_inliers(comparison.image().features, shared.inliers)};
 }
 
 void ExclusionWindow::reserve_next() {
@@ -148,7 +149,7 @@ void ExclusionWindow::add(const Detection& frame, const std::optional<View>& vie
   const double last_s =
       times_s_.empty() ? -std::numeric_limits<double>::infinity() : times_s_.back();
   times_s_.push_back(frame.status == Status::unreadable ? last_s : frame.timestamp_s.value_or(0.0));
-  if (view) latest_inliers_ = view->inliers;
+  if (view) latest_shared_ = view->shared;
 }
 
 }  // namespace loopbit

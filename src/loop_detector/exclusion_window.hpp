@@ -11,6 +11,7 @@
 #include "loopbit/loop_detector_options.hpp"
 #include "loopbit/surf.hpp"
 
+#include "evenness.hpp"
 #include "places.hpp"
 #include "recent_view.hpp"
 #include "workspace.hpp"
@@ -33,7 +34,7 @@ class ExclusionWindow {
   struct View {
     RecentView::Look look;
     PlaceId begin = 0;  ///< where the window begins and the candidates end
-    int inliers = 0;    ///< shared with the change of view before, see inlier_worth()
+    SharedView shared;  ///< with the change of view before
   };
 
   /// What is seen of the new frame.
@@ -64,12 +65,12 @@ class ExclusionWindow {
   bool leave_out_companion(Comparison& comparison, PlaceId place) const;
   [[nodiscard]] PlaceId begin(const RecentView::Look& look,
                               std::optional<double> timestamp_s) const;
-  [[nodiscard]] int view_inliers(Comparison& comparison, bool is_step) const;
+  [[nodiscard]] SharedView shared_view(Comparison& comparison, bool is_step) const;
 
   const LoopDetectorOptions& options_;
   const Places& places_;
   std::vector<double> times_s_;  ///< of each frame of this session, or of the readable one before
-  int latest_inliers_ = 0;       ///< of the last View
+  SharedView latest_shared_;     ///< of the last View
 };
 
 }  // namespace loopbit

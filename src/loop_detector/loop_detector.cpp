@@ -396,7 +396,7 @@ class LoopDetector::Impl {
   }
 
   [[nodiscard]] CandidateVerifier::Query verified_query(const Observation& seen) const {
-    return {seen.features, seen.view.inliers, seen.closely, camera()};
+    return {seen.features, seen.view.shared, seen.closely, camera()};
   }
 
   /// Null = not known.

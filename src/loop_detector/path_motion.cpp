@@ -177,11 +177,12 @@ Returns returns_to(std::vector<std::ptrdiff_t> steps, std::ptrdiff_t num_steps,
   return returns;
 }
 
-/// The mean of a rate that is not known, as if one path had ended after the usual number of steps.
-/// The longer the robot has followed its path, the longer that is expected to go on.
+/// The mean of a rate that is not known, as if half a path had ended in half of the usual number of
+/// steps: Jeffreys' prior of a rate is half an event. The longer the robot has followed its path,
+/// the longer that is expected to go on.
 double leave_probability(double independence, const Followed& followed) {
-  return std::min(1 / (kUsualSteps + followed.steps),
-                  independence / (kUsualIndependent + followed.independent));
+  return std::min(1 / (kUsualSteps + 2 * followed.steps),
+                  independence / (kUsualIndependent + 2 * followed.independent));
 }
 
 Belief one_step_later(const Belief& belief, double leave, const AgreementOfMoves& agreement) {

@@ -36,7 +36,7 @@ constexpr double kGeometryDensity = 0.5 / 10;
 /// Inliers of a wrong place persist half as long along a path as its votes.
 constexpr double kGeometryIndependence = 2;
 /// How rare a thing is can be known no better than by one in so many steps: inliers count fully
-/// once the map has so many, and before in proportion to the logarithm.
+/// once the map has so many, and before at most in proportion to the logarithm.
 constexpr double kFullSteps = 200;
 /// Just beyond chance, wrong places are as frequent as just below: the rate of wrong places counts
 /// fully from so many inliers beyond.
