@@ -29,7 +29,7 @@ std::size_t cell_of(const Features& image, const Keypoint& keypoint) {
   };
   const int row = cell(keypoint.y_px, image.working_size_px.height, kRows);
   const int column = cell(keypoint.x_px, image.working_size_px.width, kColumns);
-  return static_cast<std::size_t>(row * kColumns + column);
+  return static_cast<std::size_t>(row) * kColumns + static_cast<std::size_t>(column);
 }
 
 /// Where a place shows what is seen in the query, roughly: inliers are scaled and moved alike.
