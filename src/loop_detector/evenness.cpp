@@ -23,13 +23,12 @@ constexpr double kPriorInliers = 20;
 
 std::size_t cell_of(const Features& image, const Keypoint& keypoint) {
   const auto cell = [](float px, int side_px, int number) {
-    return std::clamp(
-        static_cast<int>(px * static_cast<float>(number) / static_cast<float>(side_px)), 0,
-        number - 1);
+    const float at = px * static_cast<float>(number) / static_cast<float>(side_px);
+    return static_cast<std::size_t>(std::clamp(at, 0.0F, static_cast<float>(number - 1)));
   };
-  const int row = cell(keypoint.y_px, image.working_size_px.height, kRows);
-  const int column = cell(keypoint.x_px, image.working_size_px.width, kColumns);
-  return static_cast<std::size_t>(row) * kColumns + static_cast<std::size_t>(column);
+  const cv::Size size_px = image.working_size_px;
+  return cell(keypoint.y_px, size_px.height, kRows) * kColumns +
+         cell(keypoint.x_px, size_px.width, kColumns);
 }
 
 /// Where a place shows what is seen in the query, roughly: inliers are scaled and moved alike.
