@@ -27,8 +27,8 @@ struct CandidateGeometry {
   double distinctness = 1;  ///< 0 to 1, see distinctness()
   int chance_inliers = 8;   ///< see chance_inliers(); that of pixels
 
-  /// That it shows the same place, in distinct inliers that count in full. An inlier counts at most
-  /// `known`.
+  /// That it shows the same place, in distinct inliers that count in full. `known`, 0 to 1: how
+  /// well the map can show that a feature is rare; an inlier counts no more than that.
   [[nodiscard]] double evidence(double known = 1) const {
     return distinct_inliers * std::min(inlier_worth, known) * view_worth * distinctness;
   }

@@ -11,6 +11,8 @@
 
 #include "loopbit/median.hpp"
 
+#include "image_parts.hpp"
+
 namespace loopbit {
 namespace {
 
@@ -22,13 +24,7 @@ constexpr int kRows = 3;
 constexpr double kPriorInliers = 20;
 
 std::size_t cell_of(const Features& image, const Keypoint& keypoint) {
-  const auto cell = [](float px, int side_px, int number) {
-    const float at = px * static_cast<float>(number) / static_cast<float>(side_px);
-    return static_cast<std::size_t>(std::clamp(at, 0.0F, static_cast<float>(number - 1)));
-  };
-  const cv::Size size_px = image.working_size_px;
-  return cell(keypoint.y_px, size_px.height, kRows) * kColumns +
-         cell(keypoint.x_px, size_px.width, kColumns);
+  return cell_of(keypoint, image.working_size_px, kColumns, kRows);
 }
 
 /// Where a place shows what is seen in the query, roughly: inliers are scaled and moved alike.

@@ -12,6 +12,12 @@ namespace {
 /// Gaps of up to twice as many content pixels belong to a part.
 constexpr int kHalfGap_px = 3;
 
+/// In which of `number` equal parts of a side a keypoint lies.
+int part_of(float px, int side_px, int number) {
+  const float part = px * static_cast<float>(number) / static_cast<float>(side_px);
+  return static_cast<int>(std::clamp(part, 0.0F, static_cast<float>(number - 1)));
+}
+
 std::uint64_t column_bit(const cv::Point& pixel) {
   return std::uint64_t{1} << static_cast<unsigned>(pixel.x);
 }
@@ -25,11 +31,8 @@ BinaryContent inverted(const BinaryContent& content) {
 }  // namespace
 
 cv::Point content_pixel(const Keypoint& keypoint, const cv::Size& size_px) {
-  const auto scaled = [](float x, int side) {
-    const auto pixel = static_cast<int>(x * kContentSide / static_cast<float>(side));
-    return std::clamp(pixel, 0, kContentSide - 1);
-  };
-  return {scaled(keypoint.x_px, size_px.width), scaled(keypoint.y_px, size_px.height)};
+  return {part_of(keypoint.x_px, size_px.width, kContentSide),
+          part_of(keypoint.y_px, size_px.height, kContentSide)};
 }
 
 bool is_set(const BinaryContent& content, const cv::Point& pixel) {
@@ -64,9 +67,9 @@ BinaryContent closed(const BinaryContent& content) {
   return inverted(dilated(inverted(dilated(content, kHalfGap_px)), kHalfGap_px));
 }
 
-std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px) {
-  const cv::Point cell = content_pixel(keypoint, size_px) * kCellsPerSide / kContentSide;
-  const int index = cell.y * kCellsPerSide + cell.x;
+std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px, int columns, int rows) {
+  const int row = part_of(keypoint.y_px, size_px.height, rows);
+  const int index = row * columns + part_of(keypoint.x_px, size_px.width, columns);
   return static_cast<std::size_t>(index);
 }
 

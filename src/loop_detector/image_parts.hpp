@@ -30,7 +30,9 @@ BinaryContent closed(const BinaryContent& content);
 inline constexpr int kCellsPerSide = 4;
 template <typename Value>
 using PerCell = std::array<Value, std::size_t{kCellsPerSide} * kCellsPerSide>;
-std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px);
+/// The number of the cell, row by row.
+std::size_t cell_of(const Keypoint& keypoint, const cv::Size& size_px, int columns = kCellsPerSide,
+                    int rows = kCellsPerSide);
 
 /// Whether keypoints of an image lie in less than half of the cells that have features.
 bool is_lesser_part(const std::vector<Keypoint>& part, const Features& image);
