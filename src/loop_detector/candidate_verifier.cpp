@@ -14,7 +14,7 @@ namespace {
 /// An inlier counts fully if so many of the features around the inliers are inliers themselves. If
 /// only a door looks like another door, the walls around it do not match.
 constexpr double kFullShare = 0.1;
-/// The same for Evenness: its median at right places of a street.
+/// The same for Evenness: about its median at right places of a street.
 constexpr double kFullEvenness = 0.85;
 /// An inlier counts less if a view shares more distinct inliers than this with the one before, but
 /// at least half: a camera that hovers sees nearly all of it again.
