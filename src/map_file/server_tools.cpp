@@ -29,7 +29,7 @@ namespace {
 /// A row of a session: the number of its table, what tells it from others there, and its checksum.
 using SessionRow = std::array<std::int64_t, 5>;
 
-constexpr const char* kRows =
+constexpr const char* kSessionRows =
     "SELECT 0, frames, 0, 0, checksum FROM session WHERE session = ?1 "
     "UNION ALL SELECT 1, place, 0, 0, checksum FROM place WHERE session = ?1 "
     "UNION ALL SELECT 2, place, 0, 0, checksum FROM features WHERE place BETWEEN ?2 AND ?3 "
@@ -41,8 +41,8 @@ constexpr const char* kRows =
     "session = ?1";
 
 /// Sorted. A checksum covers its row, so that equal lists are equal sessions.
-std::vector<SessionRow> rows_of(const MapDatabase& map, int session) {
-  const auto found = map.prepare(kRows);
+std::vector<SessionRow> session_rows(const MapDatabase& map, int session) {
+  const auto found = map.prepare(kSessionRows);
   const KeyRange places = places_of(map, session);
   found->bind(1, std::int64_t{session});
   found->bind(2, places.first);
@@ -132,11 +132,11 @@ class SessionMove {
       return;
     }
     check(*moved, there);
-    const std::vector<SessionRow> rows = rows_of(*source_, session);
-    if (rows_of(*target_, session) != rows || !damage_there(session).clauses().empty()) {
+    const std::vector<SessionRow> rows = session_rows(*source_, session);
+    if (session_rows(*target_, session) != rows || !damage_there(session).clauses().empty()) {
       copy(*moved, there);
       refuse_damaged(target_->path(), damage_there(session).clauses());
-      if (rows_of(*target_, session) != rows) throw changed(session);
+      if (session_rows(*target_, session) != rows) throw changed(session);
     }
     remove(*moved, rows);
     ++counts.sessions;
@@ -241,7 +241,7 @@ class SessionMove {
   void remove(const MapSession& moved, const std::vector<SessionRow>& rows) const {
     const auto transaction = source_->begin();
     source_->hold_back_commits();
-    if (rows_of(*source_, moved.session) != rows) throw changed(moved.session);
+    if (session_rows(*source_, moved.session) != rows) throw changed(moved.session);
     remove_session(*source_, moved.session);
     const auto row = source_->prepare("INSERT INTO moved (uid, session) VALUES (?1, ?2)");
     row->bind(1, std::string_view(moved.uid));
