@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "distinctness.hpp"
 #include "place_filter.hpp"
 
 namespace loopbit {
@@ -38,6 +39,20 @@ Candidate CandidateFinder::candidate(PlaceId place, const BinaryContent& content
                             options_.retrieval.shift_tolerance_columns)};
 }
 
+/// Whether the robot is sure to be at an earlier place.
+bool CandidateFinder::is_back(const Query& query) const {
+  return 1 - query.prior.elsewhere() >= options_.decision.min_score;
+}
+
+bool CandidateFinder::are_one_place(const std::vector<std::ptrdiff_t>& steps) const {
+  const auto spot_of = [this](std::ptrdiff_t step) {
+    return Spot{step, places_.known_loops().first_visit(step)};
+  };
+  return std::ranges::all_of(steps, [&](std::ptrdiff_t step) {
+    return is_same_place(spot_of(steps.front()), spot_of(step));
+  });
+}
+
 /// By odometry, only those in reach may match. The others still show what wrong places have, and in
 /// their stead less similar ones may match, too.
 void CandidateFinder::add_similar(const Query& query, FrameCandidates& found) const {
@@ -59,9 +74,8 @@ void CandidateFinder::add_similar(const Query& query, FrameCandidates& found) co
     }
     similar.resize(std::min(most, similar.size()));
   }
-  // Where the robot is sure to be back, half of them are rivals enough.
-  const bool is_back = 1 - query.prior.elsewhere() >= options_.decision.min_score;
-  if (is_back) similar.resize((similar.size() + 1) / 2);
+  // Half of them are rivals enough.
+  if (is_back(query)) similar.resize((similar.size() + 1) / 2);
   found.num_similar = similar.size();
   found.places = std::move(similar);
   found.places.insert(found.places.end(), also_in_reach.begin(), also_in_reach.end());
@@ -76,11 +90,15 @@ void CandidateFinder::keep_in_reach(const OdometryPose& odometry, FrameCandidate
 }
 
 /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
-/// while.
+/// while. Where it surely does and all paths are laps through one place, one of them is enough to
+/// look around, so that a frame costs the same after many laps.
 void CandidateFinder::add_expected(const Query& query, FrameCandidates& found) const {
-  for (const std::ptrdiff_t middle :
-       PlaceFilter::likeliest(query.prior, kMinFollowedProbability, kFollowedPaths)) {
-    for (std::ptrdiff_t step = middle - kFollowedReach; step <= middle + kFollowedReach; ++step) {
+  const std::vector<std::ptrdiff_t> paths =
+      PlaceFilter::likeliest(query.prior, kMinFollowedProbability, kFollowedPaths);
+  const bool are_laps = paths.size() == kFollowedPaths && is_back(query) && are_one_place(paths);
+  for (const std::ptrdiff_t middle : paths) {
+    const std::ptrdiff_t reach = are_laps && middle != paths.front() ? 0 : kFollowedReach;
+    for (std::ptrdiff_t step = middle - reach; step <= middle + reach; ++step) {
       const auto place = places_.place_of(step);
       if (!place || !found.may_match(*place)) continue;
       if (std::ranges::find(found.places, *place, &Candidate::place) != found.places.end()) {

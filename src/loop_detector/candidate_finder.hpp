@@ -58,6 +58,8 @@ class CandidateFinder {
 
  private:
   [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const;
+  [[nodiscard]] bool is_back(const Query& query) const;
+  [[nodiscard]] bool are_one_place(const std::vector<std::ptrdiff_t>& steps) const;
   void add_similar(const Query& query, FrameCandidates& found) const;
   void keep_in_reach(const OdometryPose& odometry, FrameCandidates& found) const;
   void add_expected(const Query& query, FrameCandidates& found) const;
