@@ -34,7 +34,7 @@ class ExpectedPlaces : public ::testing::Test {
   }
 
   /// Those that a frame is compared with because the robot may be there with this probability.
-  [[nodiscard]] std::vector<PlaceId> expected(double probability) const {
+  [[nodiscard]] std::vector<PlaceId> expected(double probability) {
     Belief prior;
     double part = 0.5;
     for (const std::ptrdiff_t step : {50, 150, 250}) {
@@ -57,7 +57,7 @@ class ExpectedPlaces : public ::testing::Test {
 
   LoopDetectorOptions options_;
   Places places_;
-  mutable SessionOdometry odometry_;
+  SessionOdometry odometry_;
 };
 
 using Numbers = std::vector<PlaceId>;

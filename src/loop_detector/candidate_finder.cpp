@@ -45,12 +45,10 @@ bool CandidateFinder::is_back(const Query& query) const {
 }
 
 bool CandidateFinder::are_one_place(const std::vector<std::ptrdiff_t>& steps) const {
-  const auto spot_of = [this](std::ptrdiff_t step) {
-    return Spot{step, places_.known_loops().first_visit(step)};
-  };
-  return std::ranges::all_of(steps, [&](std::ptrdiff_t step) {
-    return is_same_place(spot_of(steps.front()), spot_of(step));
-  });
+  const KnownLoops& loops = places_.known_loops();
+  const Spot first = spot_of(steps.front(), loops);
+  return std::ranges::all_of(
+      steps, [&](std::ptrdiff_t step) { return is_same_place(first, spot_of(step, loops)); });
 }
 
 /// By odometry, only those in reach may match. The others still show what wrong places have, and in
@@ -91,7 +89,7 @@ void CandidateFinder::keep_in_reach(const OdometryPose& odometry, FrameCandidate
 
 /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
 /// while. Where it surely does and all paths are laps through one place, one of them is enough to
-/// look around, so that a frame costs the same after many laps.
+/// look around, so that a frame costs hardly more after many laps.
 void CandidateFinder::add_expected(const Query& query, FrameCandidates& found) const {
   const std::vector<std::ptrdiff_t> paths =
       PlaceFilter::likeliest(query.prior, kMinFollowedProbability, kFollowedPaths);

@@ -18,6 +18,10 @@ struct Elsewhere {
 
 }  // namespace
 
+Spot spot_of(std::ptrdiff_t step, const KnownLoops& loops) {
+  return {step, loops.first_visit(step)};
+}
+
 bool is_same_place(const Spot& a, const Spot& b) {
   return std::abs(a.step - b.step) < kSamePlaceSteps ||
          std::abs(a.first_visit - b.first_visit) < kSamePlaceSteps;

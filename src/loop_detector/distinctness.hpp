@@ -8,6 +8,8 @@
 
 #include "loopbit/verification.hpp"
 
+#include "known_loops.hpp"
+
 namespace loopbit {
 
 /// Where along the path a place lies.
@@ -15,6 +17,9 @@ struct Spot {
   std::ptrdiff_t step = 0;
   std::ptrdiff_t first_visit = 0;  ///< see KnownLoops
 };
+
+/// That of a step.
+Spot spot_of(std::ptrdiff_t step, const KnownLoops& loops);
 
 /// Fewer than 6 steps apart, or their first visits.
 bool is_same_place(const Spot& a, const Spot& b);

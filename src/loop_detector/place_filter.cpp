@@ -204,8 +204,7 @@ double PlaceFilter::Observed::log_likelihood_ratio() const {
 }
 
 bool PlaceFilter::is_near(std::ptrdiff_t a, std::ptrdiff_t b, const KnownLoops& loops) {
-  return std::abs(a - b) <= kOnePathSteps ||
-         is_same_place({a, loops.first_visit(a)}, {b, loops.first_visit(b)});
+  return std::abs(a - b) <= kOnePathSteps || is_same_place(spot_of(a, loops), spot_of(b, loops));
 }
 
 double PlaceFilter::rounded(double value) {

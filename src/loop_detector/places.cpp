@@ -82,10 +82,7 @@ std::optional<PlaceId> Places::place_of(std::ptrdiff_t step) const {
   return step < 0 ? memory_.place_of(step) : recent_view_.place_of(step);
 }
 
-Spot Places::spot_of(PlaceId place) const {
-  const std::ptrdiff_t step = step_of(place);
-  return {step, known_loops_.first_visit(step)};
-}
+Spot Places::spot_of(PlaceId place) const { return loopbit::spot_of(step_of(place), known_loops_); }
 
 std::ptrdiff_t Places::steps_before(PlaceId end) const {
   return memory_.earlier_steps() + (end == 0 ? 0 : recent_view_.step_of(end - 1) + 1);
