@@ -14,15 +14,17 @@ namespace {
 
 constexpr int kStepsOfLap = 100;
 
-/// Three laps, of which each step shows another view; in each, the robot may be at step 50.
-class ExpectedPlaces : public ::testing::Test {
+/// Three laps that look the same, of which each step shows another view; in each, the robot may be
+/// at step 50.
+class CandidatesOfLaps : public ::testing::Test {
  protected:
-  ExpectedPlaces() : places_(options_, nullptr), odometry_(options_, places_) {
-    options_.retrieval.max_candidates = 1;
+  CandidatesOfLaps() : places_(options_, nullptr), odometry_(options_, places_) {
     Random random;
     for (int place = 0; place < 3 * kStepsOfLap; ++place) {
       const RecentView::Look step{.is_step = true, .far_step = static_cast<std::size_t>(place)};
-      places_.add(random_content(random, 0.3), Features{}, step, Detection{.frame = place}, {});
+      places_.add(place < kStepsOfLap ? random_content(random, 0.3)
+                                      : places_.contents().content(place - kStepsOfLap),
+                  Features{}, step, Detection{.frame = place}, {});
     }
   }
 
@@ -33,8 +35,9 @@ class ExpectedPlaces : public ::testing::Test {
     }
   }
 
-  /// Those that a frame is compared with because the robot may be there with this probability.
-  [[nodiscard]] std::vector<PlaceId> expected(double probability) {
+  /// Of a frame that looks like step 7 of each lap, where the robot may be at an earlier place with
+  /// this probability.
+  [[nodiscard]] FrameCandidates candidates(double probability) {
     Belief prior;
     double part = 0.5;
     for (const std::ptrdiff_t step : {50, 150, 250}) {
@@ -46,13 +49,7 @@ class ExpectedPlaces : public ::testing::Test {
     view.begin = places_.size();
     const BinaryContent content = places_.contents().content(7);
     const CandidateFinder finder(options_, places_, odometry_);
-    const FrameCandidates found = finder.find({content, view, prior, unknown}, {});
-    EXPECT_EQ(found.num_similar, 1U);
-    std::vector<PlaceId> places;
-    for (const Candidate& c : found.places) {
-      if (c.place != 7) places.push_back(c.place);
-    }
-    return places;
+    return finder.find({content, view, prior, unknown}, {});
   }
 
   LoopDetectorOptions options_;
@@ -61,6 +58,22 @@ class ExpectedPlaces : public ::testing::Test {
 };
 
 using Numbers = std::vector<PlaceId>;
+
+/// Those that a frame is compared with because the robot may be there.
+class ExpectedPlaces : public CandidatesOfLaps {
+ protected:
+  ExpectedPlaces() { options_.retrieval.max_candidates = 1; }
+
+  [[nodiscard]] Numbers expected(double probability) {
+    const FrameCandidates found = candidates(probability);
+    EXPECT_EQ(found.num_similar, 1U);
+    Numbers places;
+    for (const Candidate& c : found.places) {
+      if (c.place % kStepsOfLap != 7) places.push_back(c.place);
+    }
+    return places;
+  }
+};
 
 const Numbers kAroundAll = {48, 49, 50, 51, 52, 148, 149, 150, 151, 152, 248, 249, 250, 251, 252};
 
@@ -72,6 +85,55 @@ TEST_F(ExpectedPlaces, OfManyLapsAreFewerWhereTheRobotIsSurelyBack) {
   know_lap(2);
   EXPECT_EQ(expected(0.99), (Numbers{48, 49, 50, 51, 52, 150, 250}));
   EXPECT_EQ(expected(0.9), kAroundAll) << "not sure";
+}
+
+/// Those that look most alike, and which of them tell what wrong places have.
+class SimilarPlaces : public CandidatesOfLaps {
+ protected:
+  static Numbers similar(const FrameCandidates& found) {
+    Numbers places;
+    for (std::size_t i = 0; i < found.num_similar; ++i) places.push_back(found.places[i].place);
+    return places;
+  }
+
+  [[nodiscard]] Numbers all_similar(int most, double probability = 0) {
+    options_.retrieval.max_candidates = most;
+    return similar(candidates(probability));
+  }
+};
+
+TEST_F(SimilarPlaces, AreHalfWhereTheRobotIsSurelyBack) {
+  EXPECT_EQ(all_similar(30, 0.9).size(), 30U);
+  EXPECT_EQ(all_similar(30, 0.99).size(), 15U);
+}
+
+TEST_F(SimilarPlaces, AreDifferentOnesWhereTooManyAreLaps) {
+  const Numbers similar_to_7 = all_similar(24);
+  const Numbers six = all_similar(6);
+  ASSERT_EQ(Numbers(six.begin(), six.begin() + 3), (Numbers{7, 107, 207}));
+  EXPECT_EQ(six, Numbers(similar_to_7.begin(), similar_to_7.begin() + 6));
+  know_lap(1);
+  know_lap(2);
+  // More than two thirds are different: one of three laps each, in the order of their similarity.
+  Numbers expected;
+  for (std::size_t i = 0; i < 5; ++i) expected.push_back(similar_to_7[3 * i]);
+  EXPECT_EQ(all_similar(6), expected);
+  const FrameCandidates found = candidates(0);
+  ASSERT_EQ(found.places.size(), 6U);
+  EXPECT_EQ(found.places.back().place, 107) << "the most similar lap remains a candidate";
+}
+
+TEST_F(SimilarPlaces, MayBeLapsIfTheyAreFew) {
+  const Numbers alike = all_similar(12);
+  places_.known_loops().add(107, 7);
+  EXPECT_EQ(all_similar(12), alike);
+}
+
+TEST_F(SimilarPlaces, OfASmallMapMayBeLaps) {
+  const Numbers alike = all_similar(27);
+  know_lap(1);
+  know_lap(2);
+  EXPECT_EQ(all_similar(27), alike) << "there are less than 108";
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include "candidate_finder.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 #include "distinctness.hpp"
@@ -22,6 +23,16 @@ constexpr std::ptrdiff_t kPlacesJustLeft = 2;
 /// With odometry, so many times as many places are looked up, up to kMaxCandidates: those of other
 /// storeys may look more alike than the one where the robot is.
 constexpr int kLookAlikes = 10;
+/// Where too many are laps, so many times as many places are looked up at first.
+constexpr int kLaps = 4;
+
+/// Of `num_places` similar ones, so many must be different, or they do not tell what wrong places
+/// have: a third of laps through the right one move their median by two thirds of a deviation.
+std::size_t min_different(std::size_t num_places) { return 2 * num_places / 3 + 1; }
+
+bool is_among(const std::vector<Candidate>& candidates, PlaceId place) {
+  return std::ranges::find(candidates, place, &Candidate::place) != candidates.end();
+}
 
 }  // namespace
 
@@ -54,12 +65,14 @@ bool CandidateFinder::are_one_place(const std::vector<std::ptrdiff_t>& steps) co
 /// By odometry, only those in reach may match. The others still show what wrong places have, and in
 /// their stead less similar ones may match, too.
 void CandidateFinder::add_similar(const Query& query, FrameCandidates& found) const {
-  RetrievalOptions retrieval = options_.retrieval;
-  const auto most = static_cast<std::size_t>(retrieval.max_candidates);
-  if (query.odometry) {
-    retrieval.max_candidates = std::min(kMaxCandidates, kLookAlikes * retrieval.max_candidates);
-  }
-  auto similar = places_.contents().query(query.content, found.end, retrieval, found.is_allowed);
+  const auto most = static_cast<std::size_t>(options_.retrieval.max_candidates);
+  const PlaceTest is_wanted = found.is_allowed;
+  const auto look_up = [&](int times) {
+    RetrievalOptions retrieval = options_.retrieval;
+    retrieval.max_candidates = std::min(kMaxCandidates, times * retrieval.max_candidates);
+    return places_.contents().query(query.content, found.end, retrieval, is_wanted);
+  };
+  std::vector<Candidate> similar = look_up(query.odometry ? kLookAlikes : 1);
   std::vector<Candidate> also_in_reach;
   if (query.odometry) {
     keep_in_reach(*query.odometry, found);
@@ -74,9 +87,53 @@ void CandidateFinder::add_similar(const Query& query, FrameCandidates& found) co
   }
   // Half of them are rivals enough.
   if (is_back(query)) similar.resize((similar.size() + 1) / 2);
-  found.num_similar = similar.size();
+  found.num_similar = put_different_first(look_up, similar);
   found.places = std::move(similar);
-  found.places.insert(found.places.end(), also_in_reach.begin(), also_in_reach.end());
+  for (const Candidate& other : also_in_reach) {
+    if (!is_among(found.places, other.place)) found.places.push_back(other);
+  }
+}
+
+/// Laps through one place do not tell what wrong places have. Where too many of the similar ones
+/// are laps, the most similar ones that are different come first, and the others remain candidates.
+/// Returns how many tell.
+std::size_t CandidateFinder::put_different_first(const LookUp& look_up,
+                                                 std::vector<Candidate>& similar) const {
+  const std::size_t least = min_different(similar.size());
+  std::vector<Candidate> rivals = different(similar, least);
+  if (rivals.size() == least) return similar.size();
+  for (int times = kLaps; rivals.size() < least; times *= 2) {
+    const std::vector<Candidate> more = look_up(times);
+    // All places of a small map are no rivals: most look little like this one.
+    const auto asked = static_cast<std::size_t>(times * options_.retrieval.max_candidates);
+    if (more.size() < asked) return similar.size();
+    rivals = different(more, least);
+  }
+  for (const Candidate& lap : similar) {
+    if (rivals.size() < similar.size() && !is_among(rivals, lap.place)) rivals.push_back(lap);
+  }
+  similar = std::move(rivals);
+  return least;
+}
+
+/// The first of `similar`, at most `most` of them, that are not laps through one place.
+std::vector<Candidate> CandidateFinder::different(const std::vector<Candidate>& similar,
+                                                  std::size_t most) const {
+  const std::ptrdiff_t spacing = options_.retrieval.min_spacing;
+  std::vector<Candidate> found;
+  std::vector<Spot> spots;
+  for (const Candidate& candidate : similar) {
+    if (found.size() == most) break;
+    const Spot spot = spot_of(places_.step_of(candidate.place), places_.known_loops());
+    const auto is_lap = [&](const Spot& other) {
+      return std::abs(spot.first_visit - other.first_visit) < spacing &&
+             std::abs(spot.step - other.step) >= spacing;
+    };
+    if (std::ranges::any_of(spots, is_lap)) continue;
+    found.push_back(candidate);
+    spots.push_back(spot);
+  }
+  return found;
 }
 
 void CandidateFinder::keep_in_reach(const OdometryPose& odometry, FrameCandidates& found) const {
@@ -98,10 +155,7 @@ void CandidateFinder::add_expected(const Query& query, FrameCandidates& found) c
     const std::ptrdiff_t reach = are_laps && middle != paths.front() ? 0 : kFollowedReach;
     for (std::ptrdiff_t step = middle - reach; step <= middle + reach; ++step) {
       const auto place = places_.place_of(step);
-      if (!place || !found.may_match(*place)) continue;
-      if (std::ranges::find(found.places, *place, &Candidate::place) != found.places.end()) {
-        continue;
-      }
+      if (!place || !found.may_match(*place) || is_among(found.places, *place)) continue;
       const Candidate expected = candidate(*place, query.content);
       // Nothing is like a frame that could not be read.
       if (expected.similarity > 0) found.places.push_back(expected);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -24,7 +25,7 @@ namespace loopbit {
 struct FrameCandidates {
   /// The most similar ones, others that may match, and those just left, which may not.
   std::vector<Candidate> places = {};
-  std::size_t num_similar = 0;
+  std::size_t num_similar = 0;  ///< without laps, where too many are
   std::size_t num_just_left = 0;
   std::vector<Candidate> too_far = {};  ///< of the most similar ones, those out of reach
 
@@ -57,10 +58,16 @@ class CandidateFinder {
   [[nodiscard]] FrameCandidates find(const Query& query, PlaceTest is_allowed) const;
 
  private:
+  /// Looks up so many times as many places as usual.
+  using LookUp = std::function<std::vector<Candidate>(int times)>;
+
   [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const;
   [[nodiscard]] bool is_back(const Query& query) const;
   [[nodiscard]] bool are_one_place(const std::vector<std::ptrdiff_t>& steps) const;
   void add_similar(const Query& query, FrameCandidates& found) const;
+  std::size_t put_different_first(const LookUp& look_up, std::vector<Candidate>& similar) const;
+  [[nodiscard]] std::vector<Candidate> different(const std::vector<Candidate>& similar,
+                                                 std::size_t most) const;
   void keep_in_reach(const OdometryPose& odometry, FrameCandidates& found) const;
   void add_expected(const Query& query, FrameCandidates& found) const;
   void add_just_left(const Query& query, FrameCandidates& found) const;
