@@ -18,10 +18,12 @@ constexpr int kStepsOfLap = 100;
 /// at step 50.
 class CandidatesOfLaps : public ::testing::Test {
  protected:
-  CandidatesOfLaps() : places_(options_, nullptr), odometry_(options_, places_) {
+  explicit CandidatesOfLaps(int frames_per_step = 1)
+      : places_(options_, nullptr), odometry_(options_, places_) {
     Random random;
     for (int place = 0; place < 3 * kStepsOfLap; ++place) {
-      const RecentView::Look step{.is_step = true, .far_step = static_cast<std::size_t>(place)};
+      const RecentView::Look step{.is_step = place % frames_per_step == 0,
+                                  .far_step = static_cast<std::size_t>(place / frames_per_step)};
       places_.add(place < kStepsOfLap ? random_content(random, 0.3)
                                       : places_.contents().content(place - kStepsOfLap),
                   Features{}, step, Detection{.frame = place}, {});
@@ -127,6 +129,17 @@ TEST_F(SimilarPlaces, MayBeLapsIfTheyAreFew) {
   const Numbers alike = all_similar(12);
   places_.known_loops().add(107, 7);
   EXPECT_EQ(all_similar(12), alike);
+}
+
+/// Places side by side are few steps apart, as those of one spot on two laps.
+class SimilarPlacesOfASlowRobot : public CandidatesOfLaps {
+ protected:
+  SimilarPlacesOfASlowRobot() : CandidatesOfLaps(10) {}
+};
+
+TEST_F(SimilarPlacesOfASlowRobot, AreNoLaps) {
+  options_.retrieval.max_candidates = 18;
+  EXPECT_EQ(candidates(0).num_similar, 18U);
 }
 
 TEST_F(SimilarPlaces, OfASmallMapMayBeLaps) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 #include <utility>
 
 #include "distinctness.hpp"
@@ -101,12 +102,12 @@ std::size_t CandidateFinder::put_different_first(const LookUp& look_up,
                                                  std::vector<Candidate>& similar) const {
   const std::size_t least = min_different(similar.size());
   std::vector<Candidate> rivals = different(similar, least);
-  if (rivals.size() == least) return similar.size();
+  if (rivals.size() == least || similar.empty()) return similar.size();
   for (int times = kLaps; rivals.size() < least; times *= 2) {
     const std::vector<Candidate> more = look_up(times);
     // All places of a small map are no rivals: most look little like this one.
-    const auto asked = static_cast<std::size_t>(times * options_.retrieval.max_candidates);
-    if (more.size() < asked) return similar.size();
+    const int asked = times * options_.retrieval.max_candidates;
+    if (std::ssize(more) < asked) return similar.size();
     rivals = different(more, least);
   }
   for (const Candidate& lap : similar) {

@@ -32,18 +32,19 @@ void FoundPlaces::raise_floor(const Candidate& candidate) {
   };
   const auto first_close = std::find_if(apart_.begin(), apart_.end(), is_close);
   if (first_close != apart_.end()) {
-    const bool is_only_one = std::none_of(first_close + 1, apart_.end(), is_close);
-    if (is_only_one && candidate.comes_before(*first_close)) *first_close = candidate;
+    if (!candidate.comes_before(*first_close)) return;
+    if (std::any_of(first_close + 1, apart_.end(), is_close)) return;
+    *first_close = candidate;
   } else if (apart_.size() < max_candidates_) {
     apart_.push_back(candidate);
   } else {
     const auto last = std::ranges::max_element(apart_, &Candidate::comes_before);
-    if (candidate.comes_before(*last)) *last = candidate;
+    if (!candidate.comes_before(*last)) return;
+    *last = candidate;
   }
-  if (apart_.size() == max_candidates_) {
-    const Candidate last = *std::ranges::max_element(apart_, &Candidate::comes_before);
-    if (last.comes_before(floor_)) floor_ = last;
-  }
+  if (apart_.size() < max_candidates_) return;
+  const Candidate last = *std::ranges::max_element(apart_, &Candidate::comes_before);
+  if (last.comes_before(floor_)) floor_ = last;
 }
 
 std::vector<Candidate> FoundPlaces::answer() && {
