@@ -134,12 +134,14 @@ TEST_F(SimilarPlaces, MayBeLapsIfTheyAreFew) {
 /// Places side by side are few steps apart, as those of one spot on two laps.
 class SimilarPlacesOfASlowRobot : public CandidatesOfLaps {
  protected:
-  SimilarPlacesOfASlowRobot() : CandidatesOfLaps(10) {}
+  SimilarPlacesOfASlowRobot() : CandidatesOfLaps(5) {}
 };
 
 TEST_F(SimilarPlacesOfASlowRobot, AreNoLaps) {
-  options_.retrieval.max_candidates = 18;
-  EXPECT_EQ(candidates(0).num_similar, 18U);
+  for (const int most : {6, 9, 12, 15}) {
+    options_.retrieval.max_candidates = most;
+    EXPECT_EQ(candidates(0).num_similar, static_cast<std::size_t>(most));
+  }
 }
 
 TEST_F(SimilarPlaces, OfASmallMapMayBeLaps) {
