@@ -147,7 +147,7 @@ void CandidateFinder::keep_in_reach(const OdometryPose& odometry, FrameCandidate
 
 /// A robot that revisits keeps revisiting, even where a place does not look like itself for a
 /// while. Where it surely does and all paths are laps through one place, one of them is enough to
-/// look around, so that a frame costs hardly more after many laps.
+/// look around, so that a frame costs less after many laps.
 void CandidateFinder::add_expected(const Query& query, FrameCandidates& found) const {
   const std::vector<std::ptrdiff_t> paths =
       PlaceFilter::likeliest(query.prior, kMinFollowedProbability, kFollowedPaths);
