@@ -89,7 +89,7 @@ TEST_F(ExpectedPlaces, OfManyLapsAreFewerWhereTheRobotIsSurelyBack) {
   EXPECT_EQ(expected(0.9), kAroundAll) << "not sure";
 }
 
-/// Those that look most alike, and which of them tell what wrong places have.
+/// Those that look most alike and form the null of the votes.
 class SimilarPlaces : public CandidatesOfLaps {
  protected:
   static Numbers similar(const FrameCandidates& found) {
@@ -131,7 +131,7 @@ TEST_F(SimilarPlaces, MayBeLapsIfTheyAreFew) {
   EXPECT_EQ(all_similar(12), alike);
 }
 
-/// Places side by side are few steps apart, as those of one spot on two laps.
+/// Neighbouring places are only a few steps apart, although no loop connects them.
 class SimilarPlacesOfASlowRobot : public CandidatesOfLaps {
  protected:
   SimilarPlacesOfASlowRobot() : CandidatesOfLaps(5) {}
@@ -148,7 +148,7 @@ TEST_F(SimilarPlaces, OfASmallMapMayBeLaps) {
   const Numbers alike = all_similar(27);
   know_lap(1);
   know_lap(2);
-  EXPECT_EQ(all_similar(27), alike) << "there are less than 108";
+  EXPECT_EQ(all_similar(27), alike) << "the map has fewer than 108 candidates";
 }
 
 }  // namespace

@@ -24,11 +24,13 @@ constexpr std::ptrdiff_t kPlacesJustLeft = 2;
 /// With odometry, so many times as many places are looked up, up to kMaxCandidates: those of other
 /// storeys may look more alike than the one where the robot is.
 constexpr int kLookAlikes = 10;
-/// Where too many are laps, so many times as many places are looked up at first.
-constexpr int kLaps = 4;
+/// Where too many similar places are laps, the search for others begins with so many times as many
+/// places, and doubles from there.
+constexpr int kFirstLookUp = 4;
 
-/// Of `num_places` similar ones, so many must be different, or they do not tell what wrong places
-/// have: a third of laps through the right one move their median by two thirds of a deviation.
+/// How many of `num_places` similar places must show different places to serve as the null of the
+/// votes: if a third of them are laps through the right place, their median moves by two thirds of
+/// a deviation.
 std::size_t min_different(std::size_t num_places) { return 2 * num_places / 3 + 1; }
 
 bool is_among(const std::vector<Candidate>& candidates, PlaceId place) {
@@ -95,17 +97,17 @@ void CandidateFinder::add_similar(const Query& query, FrameCandidates& found) co
   }
 }
 
-/// Laps through one place do not tell what wrong places have. Where too many of the similar ones
-/// are laps, the most similar ones that are different come first, and the others remain candidates.
-/// Returns how many tell.
+/// The null of the votes must come from wrong places, not from laps through the right one. If too
+/// many of the similar places are laps, this puts the most similar different ones first; the most
+/// similar laps remain candidates behind them. Returns how many places form the null.
 std::size_t CandidateFinder::put_different_first(const LookUp& look_up,
                                                  std::vector<Candidate>& similar) const {
   const std::size_t least = min_different(similar.size());
   std::vector<Candidate> rivals = different(similar, least);
   if (rivals.size() == least || similar.empty()) return similar.size();
-  for (int times = kLaps; rivals.size() < least; times *= 2) {
+  for (int times = kFirstLookUp; rivals.size() < least; times *= 2) {
     const std::vector<Candidate> more = look_up(times);
-    // All places of a small map are no rivals: most look little like this one.
+    // In a small map, all places would be needed, and most do not look like this one.
     const int asked = times * options_.retrieval.max_candidates;
     if (std::ssize(more) < asked) return similar.size();
     rivals = different(more, least);
@@ -117,7 +119,8 @@ std::size_t CandidateFinder::put_different_first(const LookUp& look_up,
   return least;
 }
 
-/// The first of `similar`, at most `most` of them, that are not laps through one place.
+/// The first of `similar` that are not laps through one place, at most `most` of them. Two places
+/// are laps if their first visits are less than `min_spacing` steps apart but they are not.
 std::vector<Candidate> CandidateFinder::different(const std::vector<Candidate>& similar,
                                                   std::size_t most) const {
   const std::ptrdiff_t spacing = options_.retrieval.min_spacing;

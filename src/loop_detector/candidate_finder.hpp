@@ -25,7 +25,7 @@ namespace loopbit {
 struct FrameCandidates {
   /// The most similar ones, others that may match, and those just left, which may not.
   std::vector<Candidate> places = {};
-  std::size_t num_similar = 0;  ///< without laps, where too many are
+  std::size_t num_similar = 0;  ///< so many of the first ones form the null of the votes
   std::size_t num_just_left = 0;
   std::vector<Candidate> too_far = {};  ///< of the most similar ones, those out of reach
 
@@ -58,7 +58,7 @@ class CandidateFinder {
   [[nodiscard]] FrameCandidates find(const Query& query, PlaceTest is_allowed) const;
 
  private:
-  /// Looks up so many times as many places as usual.
+  /// Looks up `times` as many places as usual.
   using LookUp = std::function<std::vector<Candidate>(int times)>;
 
   [[nodiscard]] Candidate candidate(PlaceId place, const BinaryContent& content) const;
