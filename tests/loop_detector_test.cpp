@@ -372,6 +372,35 @@ TEST(LoopDetector, AMaskThatExcludesNothingChangesNothing) {
   for (std::size_t i = 0; i < images.size(); ++i) expect_same_answer(without[i], expected[i]);
 }
 
+TEST(LoopDetector, AnImagePreparedBeforeGetsTheSameAnswer) {
+  const std::vector<cv::Mat1b> images = two_laps();
+  cv::Mat1b mask(images[0].size(), 255);
+  mask.colRange(0, 60) = 0;
+  LoopDetector expected(fast_options());
+  LoopDetector preparing(fast_options());
+  for (LoopDetector* masked : {&expected, &preparing}) masked->set_mask(mask);
+  std::vector<PreparedImage> prepared;
+  prepared.reserve(images.size());
+  for (const cv::Mat& image : images) prepared.push_back(preparing.prepare(image));
+  EXPECT_EQ(preparing.size(), 0);
+  LoopDetector detector(fast_options());
+  int loops = 0;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    Evidence of_image;
+    Evidence of_prepared;
+    const Detection answer = expected.process(images[i], std::nullopt, &of_image);
+    expect_same_answer(
+        detector.process(std::move(prepared[i]), std::nullopt, std::nullopt, &of_prepared), answer);
+    EXPECT_EQ(of_prepared.content, of_image.content);
+    EXPECT_EQ(cv::norm(of_prepared.saliency, of_image.saliency, cv::NORM_INF), 0.0);
+    EXPECT_EQ(of_prepared.inliers, of_image.inliers);
+    loops += answer.status == Status::loop ? 1 : 0;
+  }
+  EXPECT_GT(loops, kLap / 2);
+  expect_error(ErrorKind::input, {"31 x 31"},
+               [&] { (void)detector.prepare(cv::Mat1b(31, 31, 5)); });
+}
+
 TEST(LoopDetector, FeaturesMustBeWhole) {
   const Features whole = extract_surf(view(1));
   std::vector<Features> broken(5, whole);

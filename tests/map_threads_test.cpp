@@ -15,6 +15,7 @@
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
 #include "loopbit/map_tools.hpp"
+#include "loopbit/read_ahead.hpp"
 
 #include "batch_writer.hpp"
 #include "file_database.hpp"
@@ -239,6 +240,30 @@ TEST_F(MapThreads, NothingIsReadAheadWhileTheMapCannotBeRead) {
     is_back = is_ahead(place);
   }
   EXPECT_TRUE(is_back);
+}
+
+TEST(PreparedImages, ComeFromAThreadBesideTheDetector) {
+  constexpr int kScenes = 12;
+  LoopDetector alone;
+  LoopDetector detector;
+  int scene = 0;
+  ReadAhead<PreparedImage> images(
+      [&](PreparedImage& image) {
+        if (scene == 2 * kScenes) return false;
+        image = detector.prepare(view(scene++ % kScenes));
+        return true;
+      },
+      2);
+  PreparedImage image;
+  for (int i = 0; images.next(image); ++i) {
+    const Detection expected = alone.process(view(i % kScenes));
+    const Detection found = detector.process(std::move(image));
+    EXPECT_EQ(found.status, expected.status) << i;
+    EXPECT_EQ(found.match, expected.match) << i;
+    EXPECT_EQ(found.score, expected.score) << i;
+  }
+  EXPECT_TRUE(images.is_at_end());
+  EXPECT_EQ(detector.size(), 2 * kScenes);
 }
 
 }  // namespace

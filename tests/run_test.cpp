@@ -580,7 +580,7 @@ struct Told {
   std::vector<std::string> sentences;
 };
 
-Told run_all(ImageSource& source, int stop_after = -1) {
+Told run_all(ImageSource& source, int stop_after = -1, int threads = 1) {
   Told told;
   std::atomic<bool> stop{false};
   LoopDetector detector;
@@ -590,7 +590,7 @@ Told run_all(ImageSource& source, int stop_after = -1) {
          stop = static_cast<int>(told.detections.size()) == stop_after;
        },
        [&](const std::string& sentence) { told.sentences.push_back(sentence); }},
-      stop);
+      stop, {}, threads);
   return told;
 }
 
@@ -608,19 +608,22 @@ TEST(Run, BadFramesAreCountedAndTheRunGoesOn) {
   list[1] = {"broken.png", 0.5, {}, "'broken.png' is empty."};
   list[2].image = cv::Mat1b(8, 8, std::uint8_t{0});
   list[4].image = cv::Mat1f(240, 320, 0.5F);
-  FrameSource source(list);
-  const Told told = run_all(source);
-  ASSERT_EQ(told.detections.size(), 6U);
-  for (int i = 0; i < 6; ++i) {
-    EXPECT_EQ(told.detections[static_cast<std::size_t>(i)].frame, i);
-    EXPECT_EQ(told.detections[static_cast<std::size_t>(i)].timestamp_s, 0.5 * i);
-    EXPECT_EQ(told.detections[static_cast<std::size_t>(i)].status == Status::unreadable,
-              i == 1 || i == 2 || i == 4);
+  for (const int threads : {1, 2}) {
+    SCOPED_TRACE(threads);
+    FrameSource source(list);
+    const Told told = run_all(source, -1, threads);
+    ASSERT_EQ(told.detections.size(), 6U);
+    for (int i = 0; i < 6; ++i) {
+      EXPECT_EQ(told.detections[static_cast<std::size_t>(i)].frame, i);
+      EXPECT_EQ(told.detections[static_cast<std::size_t>(i)].timestamp_s, 0.5 * i);
+      EXPECT_EQ(told.detections[static_cast<std::size_t>(i)].status == Status::unreadable,
+                i == 1 || i == 2 || i == 4);
+    }
+    ASSERT_EQ(told.sentences.size(), 3U);
+    EXPECT_EQ(told.sentences[0], "Frame 1: 'broken.png' is empty.");
+    EXPECT_NE(told.sentences[1].find("8 x 8"), std::string::npos);
+    EXPECT_NE(told.sentences[2].find("frame 4"), std::string::npos);
   }
-  ASSERT_EQ(told.sentences.size(), 3U);
-  EXPECT_EQ(told.sentences[0], "Frame 1: 'broken.png' is empty.");
-  EXPECT_NE(told.sentences[1].find("8 x 8"), std::string::npos);
-  EXPECT_NE(told.sentences[2].find("frame 4"), std::string::npos);
 }
 
 /// What a run comes to whose window is 5 seconds and whose frame `untimed` of three has no time.
@@ -650,7 +653,8 @@ TEST(Run, ALaterFrameWithoutATimeIsLeftOut) {
 /// The detections of a window of one frame; `on_evidence` may be empty.
 std::vector<Detection> detect_all(
     const std::vector<Frame>& list,
-    const std::function<void(const Detection&, const cv::Mat&, const Evidence&)>& on_evidence) {
+    const std::function<void(const Detection&, const cv::Mat&, const Evidence&)>& on_evidence,
+    int threads = 1) {
   FrameSource source(list);
   LoopDetectorOptions options;
   options.exclusion.frames = 1;
@@ -661,7 +665,7 @@ std::vector<Detection> detect_all(
   run(source, detector,
       {[&](const Detection& detection) { detections.push_back(detection); },
        [](const std::string&) {}, on_evidence},
-      stop);
+      stop, {}, threads);
   return detections;
 }
 
@@ -726,9 +730,30 @@ TEST(Run, ToldOrNotTheDecisionsAreTheSame) {
   }
 }
 
+TEST(Run, AnotherThreadThatPreparesFramesChangesNoDecision) {
+  std::vector<BinaryContent> contents;
+  const auto note = [&](const Detection&, const cv::Mat& image, const Evidence& seen) {
+    EXPECT_EQ(seen.content, binary_content(image));
+    contents.push_back(seen.content);
+  };
+  const auto alone = detect_all(two_rounds(), note);
+  const auto contents_alone = std::exchange(contents, {});
+  const auto with_another = detect_all(two_rounds(), note, 2);
+  EXPECT_EQ(contents, contents_alone);
+  ASSERT_EQ(with_another.size(), alone.size());
+  for (std::size_t i = 0; i < alone.size(); ++i) {
+    EXPECT_EQ(with_another[i].name, alone[i].name);
+    EXPECT_EQ(with_another[i].status, alone[i].status);
+    EXPECT_EQ(with_another[i].match, alone[i].match);
+    EXPECT_EQ(with_another[i].score, alone[i].score);
+  }
+}
+
 TEST(Run, StopsWhenAsked) {
-  FrameSource source(frames(10));
-  EXPECT_EQ(run_all(source, 4).detections.size(), 4U);
+  for (const int threads : {1, 2}) {
+    FrameSource source(frames(10));
+    EXPECT_EQ(run_all(source, 4, threads).detections.size(), 4U);
+  }
 }
 
 TEST(Prefetch, GivesTheSameFramesInTheSameOrder) {
@@ -781,6 +806,14 @@ TEST(Prefetch, PassesErrorsOnInTheirPlace) {
   EXPECT_TRUE(source->next(frame));
   EXPECT_THROW(source->next(frame), Error);
   EXPECT_FALSE(source->next(frame));
+}
+
+TEST(Run, AnInputThatFailsEndsItWithAnyNumberOfThreads) {
+  for (const int threads : {1, 2}) {
+    FailingSource source;
+    test::expect_error(ErrorKind::input, {"The cable is out."},
+                       [&] { (void)run_all(source, -1, threads); });
+  }
 }
 
 }  // namespace

@@ -127,23 +127,35 @@ class LoopDetector::Impl {
     return seen;
   }
 
-  /// The algorithm of Wang et al. 2019, section III.
-  Detection detect(const cv::Mat& image, const Given& given, const AllowedPlaces& allowed,
-                   Observation& seen) const {
-    Detection detection = unanswered(given);
+  /// See LoopDetector::prepare.
+  [[nodiscard]] PreparedImage prepare(const cv::Mat& image) const {
+    PreparedImage prepared{.image = image};
     Stopwatch stopwatch;
 
     // Step 1: what the image is recognised by.
     const cv::Mat1b gray = gray_image(image);
     if (camera_) check_size(*camera_, "The calibration of set_camera()", gray.size());
-    seen.saliency = saliency_map(gray, options_.binary_content);
-    seen.content = binarize(seen.saliency, options_.binary_content.gamma, excluded_);
-    detection.times.content_ms = stopwatch.lap_ms();
+    prepared.saliency = saliency_map(gray, options_.binary_content);
+    prepared.content = binarize(prepared.saliency, options_.binary_content.gamma, excluded_);
+    prepared.content_ms = stopwatch.lap_ms();
 
     // Step 3 begins: features. They also tell how far back the present view reaches.
-    seen.work->surf.extract(gray, seen.features, mask_);
+    workspaces_.take()->surf.extract(gray, prepared.features, mask_);
+    prepared.features_ms = stopwatch.lap_ms();
+    return prepared;
+  }
+
+  /// The algorithm of Wang et al. 2019, section III.
+  Detection detect(PreparedImage prepared, const Given& given, const AllowedPlaces& allowed,
+                   Observation& seen) const {
+    Detection detection = unanswered(given);
+    Stopwatch stopwatch;
+    seen.saliency = std::move(prepared.saliency);
+    seen.content = prepared.content;
+    seen.features = std::move(prepared.features);
     remove_attached_parts(seen);
-    detection.times.features_ms = stopwatch.lap_ms();
+    detection.times.content_ms = prepared.content_ms;
+    detection.times.features_ms = prepared.features_ms + stopwatch.lap_ms();
     recognise(seen, allowed, detection);
     return detection;
   }
@@ -589,9 +601,18 @@ Detection LoopDetector::process(const cv::Mat& image, std::optional<double> time
 Detection LoopDetector::process(const cv::Mat& image, std::optional<double> timestamp_s,
                                 const std::optional<OdometryPose>& odometry, Evidence* evidence,
                                 const AllowedPlaces& allowed) {
+  return process(prepare(image), timestamp_s, odometry, evidence, allowed);
+}
+
+PreparedImage LoopDetector::prepare(const cv::Mat& image) const { return impl_->prepare(image); }
+
+Detection LoopDetector::process(PreparedImage prepared, std::optional<double> timestamp_s,
+                                const std::optional<OdometryPose>& odometry, Evidence* evidence,
+                                const AllowedPlaces& allowed) {
   impl_->learn();
   Impl::Observation seen = impl_->observation();
-  Detection detection = impl_->detect(image, {timestamp_s, odometry}, allowed, seen);
+  const cv::Mat image = prepared.image;
+  Detection detection = impl_->detect(std::move(prepared), {timestamp_s, odometry}, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
   impl_->remember(std::move(seen), detection, image);
   return detection;
@@ -613,7 +634,7 @@ Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timest
                               std::vector<RankedPlace>* ranking, Evidence* evidence,
                               const AllowedPlaces& allowed) const {
   Impl::Observation seen = impl_->observation();
-  Detection detection = impl_->detect(image, {timestamp_s, std::nullopt}, allowed, seen);
+  Detection detection = impl_->detect(prepare(image), {timestamp_s, std::nullopt}, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
   if (ranking) *ranking = impl_->ranked(seen, detection);
   return detection;

@@ -271,7 +271,7 @@ class RecordedRun {
     if (listener.on_start) listener.on_start(folder_.path());
     FrameOdometry odometry;
     if (odometry_) odometry = [&](const Frame& frame) { return odometry_->next(frame); };
-    run(input_, detector, recording, stop, odometry);
+    run(input_, detector, recording, stop, odometry, request_.threads);
     record_.early_end = input_.early_end();
     if (map_) map_damage_ = map_->damage();
     if (poses) poses_ = poses->poses();

@@ -2,11 +2,38 @@
 // SPDX-License-Identifier: MIT
 #include "loopbit/runner.hpp"
 
+#include <cstddef>
+#include <exception>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "loopbit/error.hpp"
+#include "loopbit/read_ahead.hpp"
 
 namespace loopbit {
+namespace {
+
+/// So many frames wait for the detector where a thread of its own prepares them.
+constexpr std::size_t kFramesPrepared = 2;
+
+/// A frame and what it is recognised by.
+struct PreparedFrame {
+  Frame frame;
+  PreparedImage image;
+  std::exception_ptr fault;  ///< why there is no `image`, although the frame has no error
+};
+
+void prepare(const LoopDetector& detector, PreparedFrame& frame) {
+  if (!frame.frame.error.empty()) return;
+  try {
+    frame.image = detector.prepare(frame.frame.image);
+  } catch (...) {
+    frame.fault = std::current_exception();
+  }
+}
+
+}  // namespace
 
 void check_time(const Frame& frame, const LoopDetectorOptions& options) {
   const double seconds = options.exclusion.seconds;
@@ -18,7 +45,7 @@ void check_time(const Frame& frame, const LoopDetectorOptions& options) {
 }
 
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
-         const std::atomic<bool>& stop, const FrameOdometry& odometry) {
+         const std::atomic<bool>& stop, const FrameOdometry& odometry, int threads) {
   bool is_first = true;
   const auto report = [&](Detection detection, const Frame& frame) {
     detection.name = frame.name;
@@ -29,7 +56,8 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
     listener.on_bad_frame(fmt::format("Frame {}: {}", detector.size(), reason));
     report(detector.skip(frame.timestamp_s, pose), frame);
   };
-  const auto detect = [&](const Frame& frame) {
+  const auto detect = [&](PreparedFrame prepared) {
+    const Frame& frame = prepared.frame;
     if (odometry) {
       pose = odometry(frame);
     } else if (frame.T_odometry_camera) {
@@ -42,7 +70,8 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
     Evidence evidence;
     Detection detection;
     try {
-      detection = detector.process(frame.image, frame.timestamp_s, pose,
+      if (prepared.fault) std::rethrow_exception(prepared.fault);
+      detection = detector.process(std::move(prepared.image), frame.timestamp_s, pose,
                                    listener.on_evidence ? &evidence : nullptr);
     } catch (const Error& error) {
       if (error.kind() != ErrorKind::input) throw;
@@ -52,7 +81,17 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
     report(detection, frame);
     if (listener.on_evidence) listener.on_evidence(detection, frame.image, evidence);
   };
-  for (Frame frame; !stop && source.next(frame);) detect(frame);
+  const auto read = [&](PreparedFrame& prepared) {
+    if (!source.next(prepared.frame)) return false;
+    prepare(detector, prepared);
+    return true;
+  };
+  const auto detect_all = [&](const auto& next) {
+    for (PreparedFrame frame; !stop && next(frame); frame = {}) detect(std::move(frame));
+  };
+  if (threads == 1) return detect_all(read);
+  ReadAhead<PreparedFrame> ahead(read, kFramesPrepared);
+  detect_all([&](PreparedFrame& frame) { return ahead.next(frame); });
 }
 
 }  // namespace loopbit

@@ -26,6 +26,17 @@ namespace loopbit {
 using AllowedPlaces = std::variant<std::monostate, std::function<bool(const SessionFrame&)>,
                                    std::span<const SessionFrame>>;
 
+/// An image and what it is recognised by, which depends on no other image: see
+/// LoopDetector::prepare().
+struct PreparedImage {
+  cv::Mat image = {};          ///< as it was given, not a copy
+  cv::Mat1f saliency = {};     ///< 64 x 64
+  BinaryContent content = {};  ///< 512 bytes
+  Features features = {};      ///< at most 50 KB by default
+  double content_ms = 0;       ///< of StepTimes
+  double features_ms = 0;      ///< of StepTimes
+};
+
 /// Tells for each camera image whether the camera has been here before.
 ///
 /// H. Wang, J. Li, M. Ran, L. Xie, "Fast Loop Closure Detection via Binary Content", 2019. Binary
@@ -35,7 +46,7 @@ using AllowedPlaces = std::variant<std::monostate, std::function<bool(const Sess
 ///
 /// Several threads may call const functions at once, such as query(). Other functions need the
 /// detector for themselves, so lock a std::shared_mutex: shared for query(), exclusive for
-/// process(). A MapStorage is asked by one thread at a time.
+/// process(). Only prepare() needs no lock. A MapStorage is asked by one thread at a time.
 ///
 /// Memory: at most 50 KB per place by default, nearly all of it features, plus working memory that
 /// is reused for every frame, for each thread that queries at the same time. With a map, the map
@@ -74,6 +85,18 @@ class LoopDetector {
   Detection process(const cv::Mat& image, std::optional<double> timestamp_s,
                     const std::optional<OdometryPose>& odometry, Evidence* evidence = nullptr,
                     const AllowedPlaces& allowed = {});
+
+  /// The first half of process(), which takes about half of its time: what the image is recognised
+  /// by. So one thread can prepare the next image while another one processes this one. May run
+  /// beside any other function but set_mask() and set_camera(). Throws Error (kind input) if the
+  /// image cannot be used.
+  [[nodiscard]] PreparedImage prepare(const cv::Mat& image) const;
+
+  /// The other half. The answer is that of process() for the same image. Another detector may have
+  /// prepared it, if its settings, mask and calibration were the same.
+  Detection process(PreparedImage prepared, std::optional<double> timestamp_s = std::nullopt,
+                    const std::optional<OdometryPose>& odometry = std::nullopt,
+                    Evidence* evidence = nullptr, const AllowedPlaces& allowed = {});
 
   /// The same for an image whose content and features a MapStorage received in an earlier run. They
   /// give the answer that the image itself would give; set_mask() does not apply. Throws Error

@@ -26,7 +26,7 @@ namespace loopbit {
 /// Python set these fields.
 struct RunRequest {
   LoopDetectorOptions options = {};
-  int threads = 1;                          ///< for run.json
+  int threads = 1;                          ///< see run()
   std::vector<std::string> arguments = {};  ///< of the command line, for run.json
 
   /// Empty = beside the map, "town_session_2" for session 2 of "town.db"; in the working folder for

@@ -42,8 +42,10 @@ using FrameOdometry = std::function<std::optional<OdometryPose>(const Frame&)>;
 /// Processes `source` frame by frame to its end, or until `stop` is true. A frame that is
 /// unreadable is reported and gets the status unreadable, and the run continues. Frames may differ
 /// in size: each is scaled by itself. Errors of the listener end the run. `odometry`: empty = there
-/// is none. Throws Error (kind option), see check_time().
+/// is none. `threads`: with 1, all is done in this one; with more, another one reads and prepares
+/// the next frames, at most three, and a run that stops early leaves them out. Throws Error (kind
+/// option), see check_time().
 void run(ImageSource& source, LoopDetector& detector, const RunListener& listener,
-         const std::atomic<bool>& stop, const FrameOdometry& odometry = {});
+         const std::atomic<bool>& stop, const FrameOdometry& odometry = {}, int threads = 1);
 
 }  // namespace loopbit
