@@ -41,13 +41,18 @@ int thread_count(int wanted) {
   return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
-/// Throws Error if the folder of --mcap-out is not there: a run may be long.
+/// With a slash at its end.
+fs::path whole_path(const fs::path& folder) { return fs::absolute(folder / "").lexically_normal(); }
+
+/// Throws Error if the folder of --mcap-out is not there and is not the run's own: a run may be
+/// long.
 void check_mcap_out(const SessionFlags& flags) {
   if (flags.mcap_out.empty()) return;
-  const fs::path file = fs::absolute(flags.mcap_out);
   std::error_code error;
-  if (fs::is_directory(file, error)) throw cannot_write(flags.mcap_out, EISDIR);
-  if (!fs::is_directory(file.parent_path(), error)) throw cannot_write(flags.mcap_out, ENOENT);
+  if (fs::is_directory(flags.mcap_out, error)) throw cannot_write(flags.mcap_out, EISDIR);
+  const fs::path folder = whole_path(fs::path(flags.mcap_out).parent_path());
+  if (fs::is_directory(folder, error) || folder == whole_path(flags.run.folder)) return;
+  throw cannot_write(flags.mcap_out, ENOENT);
 }
 
 /// Of --live, which needs no port, so that an input after it would be taken for one.

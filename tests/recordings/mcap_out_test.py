@@ -38,9 +38,11 @@ def rows_of(path):
 
 
 def walk(folder, *world):
-    """A run in the built-in world, with poses, truth and times, and its MCAP file."""
-    loopbit_command("demo", *TOWN, *world, "--out", folder / "run", "--mcap-out", folder / "out.mcap")
-    return folder, read_back(folder / "out.mcap"), rows_of(folder / "run/loops.csv")
+    """A run in the built-in world, with poses, truth and times, and its MCAP file, which lies in
+    the folder that the run makes."""
+    run = folder / "run"
+    loopbit_command("demo", *TOWN, *world, "--out", run, "--mcap-out", run / "out.mcap")
+    return folder, read_back(run / "out.mcap"), rows_of(run / "loops.csv")
 
 
 @pytest.fixture(scope="module")
