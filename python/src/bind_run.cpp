@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include <opencv2/core/utility.hpp>
 #include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -180,6 +181,7 @@ RunRequest request_of(const LoopDetectorOptions& options, const Path& folder, bo
                       const Path& odometry, bool correct, const Path& right, double baseline_m) {
   const std::string camera_file = camera.string();
   return {.options = options,
+          .threads = cv::getNumThreads(),
           .folder = folder.string(),
           .overwrite = overwrite,
           .evidence = evidence,
