@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The loopbit authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <exception>
@@ -181,7 +182,7 @@ RunRequest request_of(const LoopDetectorOptions& options, const Path& folder, bo
                       const Path& odometry, bool correct, const Path& right, double baseline_m) {
   const std::string camera_file = camera.string();
   return {.options = options,
-          .threads = cv::getNumThreads(),
+          .threads = std::max(1, cv::getNumThreads()),
           .folder = folder.string(),
           .overwrite = overwrite,
           .evidence = evidence,

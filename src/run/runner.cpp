@@ -89,7 +89,7 @@ void run(ImageSource& source, LoopDetector& detector, const RunListener& listene
   const auto detect_all = [&](const auto& next) {
     for (PreparedFrame frame; !stop && next(frame); frame = {}) detect(std::move(frame));
   };
-  if (threads == 1) return detect_all(read);
+  if (threads <= 1) return detect_all(read);
   ReadAhead<PreparedFrame> ahead(read, kFramesPrepared);
   detect_all([&](PreparedFrame& frame) { return ahead.next(frame); });
 }
