@@ -388,6 +388,13 @@ TEST(LoopDetector, AnImagePreparedBeforeGetsTheSameAnswer) {
   for (std::size_t i = 0; i < images.size(); ++i) {
     Evidence of_image;
     Evidence of_prepared;
+    std::vector<RankedPlace> ranking;
+    std::vector<RankedPlace> expected_ranking;
+    expect_same_answer(detector.query(prepared[i], std::nullopt, &ranking),
+                       expected.query(images[i], std::nullopt, &expected_ranking));
+    EXPECT_TRUE(std::ranges::equal(ranking, expected_ranking, [](const auto& a, const auto& b) {
+      return a.place == b.place && a.score == b.score && a.inliers == b.inliers;
+    }));
     const Detection answer = expected.process(images[i], std::nullopt, &of_image);
     expect_same_answer(
         detector.process(std::move(prepared[i]), std::nullopt, std::nullopt, &of_prepared), answer);

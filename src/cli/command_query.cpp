@@ -15,7 +15,6 @@
 #include "loopbit/camera_file.hpp"
 #include "loopbit/error.hpp"
 #include "loopbit/folder_watch.hpp"
-#include "loopbit/gray_image.hpp"
 #include "loopbit/loop_detector.hpp"
 #include "loopbit/map_file.hpp"
 #include "loopbit/map_server.hpp"
@@ -208,14 +207,8 @@ void print_line(const std::string& image, const Answer& answer) {
 class Relocalizer {
  public:
   explicit Relocalizer(const QueryFlags& flags)
-      : flags_(flags),
-        map_(flags),
-        detector_(detector_options(map_, flags), map_.storage()),
-        surf_(detector_.options().surf) {
-    if (!flags.mask.empty()) {
-      mask_ = read_mask(flags.mask);
-      detector_.set_mask(mask_);
-    }
+      : flags_(flags), map_(flags), detector_(detector_options(map_, flags), map_.storage()) {
+    if (!flags.mask.empty()) detector_.set_mask(read_mask(flags.mask));
     if (!flags.camera.empty()) camera_ = read_camera(flags.camera);
     // As in a run: through other lenses it finds no more than without.
     if (camera_ && camera_->lens == Lens::equidistant) detector_.set_camera(camera_);
@@ -252,11 +245,13 @@ class Relocalizer {
  private:
   void answer(const Frame& frame) {
     Answer answer;
+    PreparedImage image;
     std::vector<RankedPlace> places;
     try {
       if (!frame.error.empty()) throw Error(ErrorKind::input, frame.error);
       if (camera_) check_size(*camera_, fmt::format("'{}'", flags_.camera), frame.image.size());
-      const Detection detection = detector_.query(frame.image, std::nullopt, &places);
+      image = detector_.prepare(frame.image);
+      const Detection detection = detector_.query(image, std::nullopt, &places);
       answer.status = detection.status;
       answer.epoch = detection.epoch;
       any_readable_ = true;
@@ -265,7 +260,9 @@ class Relocalizer {
       tell(fmt::format("loopbit: '{}': {}\n", frame.name, error.what()));
     }
     answer.not_asked = map_.not_asked();
-    if (camera_ && answer.status == Status::loop) answer.pose = pose_of(frame, places.front());
+    if (camera_ && answer.status == Status::loop) {
+      answer.pose = pose_of(image.features, places.front());
+    }
     if (places.size() > flags_.places) places.resize(flags_.places);
     for (const RankedPlace& place : places) {
       answer.places.push_back({place, place_images_ ? place_images_->file_of(place.place) : ""});
@@ -274,9 +271,7 @@ class Relocalizer {
   }
 
   /// None if the place is of images of another size.
-  std::optional<RelativePose> pose_of(const Frame& frame, const RankedPlace& place) {
-    Features query;
-    surf_.extract(gray_image(frame.image), query, mask_);
+  std::optional<RelativePose> pose_of(const Features& query, const RankedPlace& place) {
     const Features match = detector_.features_of(place.place);
     if (query.working_size_px != match.working_size_px) return std::nullopt;
     return estimator_.estimate({.query = {&query, &*camera_}, .match = {&match, &*camera_}});
@@ -285,9 +280,7 @@ class Relocalizer {
   const QueryFlags& flags_;
   AskedMap map_;
   LoopDetector detector_;
-  cv::Mat1b mask_;  ///< empty = none
   std::optional<CameraModel> camera_;
-  SurfExtractor surf_;
   RelativePoseEstimator estimator_;
   std::optional<PlaceImages> place_images_;
   bool any_readable_ = false;

@@ -633,8 +633,14 @@ Detection LoopDetector::process(const BinaryContent& content, Features features,
 Detection LoopDetector::query(const cv::Mat& image, std::optional<double> timestamp_s,
                               std::vector<RankedPlace>* ranking, Evidence* evidence,
                               const AllowedPlaces& allowed) const {
+  return query(prepare(image), timestamp_s, ranking, evidence, allowed);
+}
+
+Detection LoopDetector::query(const PreparedImage& prepared, std::optional<double> timestamp_s,
+                              std::vector<RankedPlace>* ranking, Evidence* evidence,
+                              const AllowedPlaces& allowed) const {
   Impl::Observation seen = impl_->observation();
-  Detection detection = impl_->detect(prepare(image), {timestamp_s, std::nullopt}, allowed, seen);
+  Detection detection = impl_->detect(prepared, {timestamp_s, std::nullopt}, allowed, seen);
   if (evidence) *evidence = impl_->evidence(seen, detection);
   if (ranking) *ranking = impl_->ranked(seen, detection);
   return detection;

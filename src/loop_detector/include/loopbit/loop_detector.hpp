@@ -86,10 +86,10 @@ class LoopDetector {
                     const std::optional<OdometryPose>& odometry, Evidence* evidence = nullptr,
                     const AllowedPlaces& allowed = {});
 
-  /// The first half of process(), which takes about half of its time: what the image is recognised
-  /// by. So one thread can prepare the next image while another one processes this one. May run
-  /// beside any other function but set_mask() and set_camera(). Throws Error (kind input) if the
-  /// image cannot be used.
+  /// The first half of process() and query(), about half of their time: what the image is
+  /// recognised by. So one thread can prepare the next image while another one processes this one.
+  /// May run beside any other function but set_mask() and set_camera(). Throws Error (kind input)
+  /// if the image cannot be used.
   [[nodiscard]] PreparedImage prepare(const cv::Mat& image) const;
 
   /// The other half. The answer is that of process() for the same image. Another detector may have
@@ -109,6 +109,13 @@ class LoopDetector {
   /// receives all candidates, best first, at the cost of verifying each of them. Only the first can
   /// be a loop.
   [[nodiscard]] Detection query(const cv::Mat& image,
+                                std::optional<double> timestamp_s = std::nullopt,
+                                std::vector<RankedPlace>* ranking = nullptr,
+                                Evidence* evidence = nullptr,
+                                const AllowedPlaces& allowed = {}) const;
+
+  /// The same for a prepared image, whose features remain for the caller.
+  [[nodiscard]] Detection query(const PreparedImage& prepared,
                                 std::optional<double> timestamp_s = std::nullopt,
                                 std::vector<RankedPlace>* ranking = nullptr,
                                 Evidence* evidence = nullptr,
