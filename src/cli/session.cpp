@@ -41,17 +41,17 @@ int thread_count(int wanted) {
   return wanted > 0 ? std::min(wanted, cores) : cores;
 }
 
-/// With a slash at its end.
-fs::path whole_path(const fs::path& folder) { return fs::absolute(folder / "").lexically_normal(); }
-
 /// Throws Error if the folder of --mcap-out is not there and is not the run's own: a run may be
 /// long.
 void check_mcap_out(const SessionFlags& flags) {
   if (flags.mcap_out.empty()) return;
+  const fs::path file = fs::absolute(flags.mcap_out).lexically_normal();
   std::error_code error;
-  if (fs::is_directory(flags.mcap_out, error)) throw cannot_write(flags.mcap_out, EISDIR);
-  const fs::path folder = whole_path(fs::path(flags.mcap_out).parent_path());
-  if (fs::is_directory(folder, error) || folder == whole_path(flags.run.folder)) return;
+  if (fs::is_directory(file, error)) throw cannot_write(flags.mcap_out, EISDIR);
+  const fs::path of_run =
+      fs::absolute(fs::path(flags.run.folder) / file.filename()).lexically_normal();
+  const bool is_in_run = file.has_filename() && file == of_run;
+  if (is_in_run || fs::is_directory(file.parent_path(), error)) return;
   throw cannot_write(flags.mcap_out, ENOENT);
 }
 

@@ -133,10 +133,11 @@ def test_pictures_are_the_frame_and_its_match(town):
     assert Image.open(io.BytesIO(base64.b64decode(queries[0]["data"]))).size == (256, 192)
 
 
-def test_without_pictures_and_poses(tmp_path):
+def test_without_pictures_and_poses(tmp_path, monkeypatch):
     loopbit_command("demo", *TOWN, "--write-images", tmp_path / "town")
+    monkeypatch.chdir(tmp_path)
     loopbit_command("run", tmp_path / "town/images", "--limit", "30", "--out", tmp_path / "run",
-                    "--no-report", "--mcap-out", tmp_path / "out.mcap")
+                    "--no-report", "--mcap-out", "out.mcap")
     read = read_back(tmp_path / "out.mcap")
     assert on(read, "query") == [] and len(on(read, "detection")) == 30
     path = on(read, "scene")[-1]["entities"][0]["lines"][0]["points"]
@@ -172,6 +173,8 @@ def test_impossible_files_are_refused_before_the_run(tmp_path):
     for arguments, code, text in [
             (["run", images, "--mcap-out", images], 2, "would replace what INPUT"),
             (["demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", tmp_path / "none/out.mcap"], 4,
+             "No such file or directory"),
+            (["run", images, "--map", tmp_path / "map.db", "--mcap-out", tmp_path / "none/out.mcap"], 4,
              "No such file or directory"),
             (["demo", *TOWN, "--out", tmp_path / "run", "--mcap-out", tmp_path], 4, "Is a directory")]:
         ran = loopbit_command(*arguments, code=code)
