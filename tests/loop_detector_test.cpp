@@ -396,9 +396,13 @@ TEST(LoopDetector, AnImagePreparedBeforeGetsTheSameAnswer) {
       return a.place == b.place && a.score == b.score && a.inliers == b.inliers;
     }));
     const Detection answer = expected.process(images[i], std::nullopt, &of_image);
-    expect_same_answer(
-        detector.process(std::move(prepared[i]), std::nullopt, std::nullopt, &of_prepared), answer);
+    const Detection found =
+        detector.process(std::move(prepared[i]), std::nullopt, std::nullopt, &of_prepared);
+    expect_same_answer(found, answer);
+    EXPECT_GT(found.times.content_ms, 0);
+    EXPECT_GT(found.times.features_ms, 0);
     EXPECT_EQ(of_prepared.content, of_image.content);
+    EXPECT_EQ(of_prepared.saliency.size(), cv::Size(kContentSide, kContentSide));
     EXPECT_EQ(cv::norm(of_prepared.saliency, of_image.saliency, cv::NORM_INF), 0.0);
     EXPECT_EQ(of_prepared.inliers, of_image.inliers);
     loops += answer.status == Status::loop ? 1 : 0;

@@ -137,11 +137,11 @@ class LoopDetector::Impl {
     if (camera_) check_size(*camera_, "The calibration of set_camera()", gray.size());
     prepared.saliency = saliency_map(gray, options_.binary_content);
     prepared.content = binarize(prepared.saliency, options_.binary_content.gamma, excluded_);
-    prepared.content_ms = stopwatch.lap_ms();
+    prepared.times.content_ms = stopwatch.lap_ms();
 
     // Step 3 begins: features. They also tell how far back the present view reaches.
     workspaces_.take()->surf.extract(gray, prepared.features, mask_);
-    prepared.features_ms = stopwatch.lap_ms();
+    prepared.times.features_ms = stopwatch.lap_ms();
     return prepared;
   }
 
@@ -149,13 +149,13 @@ class LoopDetector::Impl {
   Detection detect(PreparedImage prepared, const Given& given, const AllowedPlaces& allowed,
                    Observation& seen) const {
     Detection detection = unanswered(given);
+    detection.times = prepared.times;
     Stopwatch stopwatch;
     seen.saliency = std::move(prepared.saliency);
     seen.content = prepared.content;
     seen.features = std::move(prepared.features);
     remove_attached_parts(seen);
-    detection.times.content_ms = prepared.content_ms;
-    detection.times.features_ms = prepared.features_ms + stopwatch.lap_ms();
+    detection.times.features_ms += stopwatch.lap_ms();
     recognise(seen, allowed, detection);
     return detection;
   }

@@ -33,8 +33,7 @@ struct PreparedImage {
   cv::Mat1f saliency = {};     ///< 64 x 64
   BinaryContent content = {};  ///< 512 bytes
   Features features = {};      ///< at most 50 KB by default
-  double content_ms = 0;       ///< of StepTimes
-  double features_ms = 0;      ///< of StepTimes
+  StepTimes times = {};        ///< of these two steps
 };
 
 /// Tells for each camera image whether the camera has been here before.
