@@ -465,6 +465,24 @@ TEST(PlaceFilter, TheMatchSharesMostWithTheFrameAsFarAsItIsProbable) {
   EXPECT_EQ(matched(), 300) << "a lap through the same place";
 }
 
+TEST(PlaceFilter, TheMatchIsInTheViewThatVotesAndInliersPrefer) {
+  const Belief belief{{{100, {0.5}}, {102, {0.3}}, {108, {0.01}}, {109, {0.02}}, {300, {0.1}}}};
+  const auto seen = [](std::ptrdiff_t step, int votes, double geometry) {
+    return PlaceFilter::Observed{
+        .candidate = {}, .step = step, .num_votes = votes, .geometry = geometry};
+  };
+  const KnownLoops loops;
+  const auto matched = [&](const PlaceFilter::Observed& other) {
+    const std::vector<PlaceFilter::Observed> observed{seen(100, 20, 3), seen(102, 20, 0), other,
+                                                      seen(109, 19, 0), seen(300, 90, 9)};
+    const auto match = PlaceFilter::match_near(100, observed, belief, loops);
+    return match ? observed[*match].step : -1;
+  };
+  EXPECT_EQ(matched(seen(108, 30, 2)), 100) << "its inliers say less";
+  EXPECT_EQ(matched(seen(108, 19, 9)), 100) << "it has fewer votes; step 300 is another place";
+  EXPECT_EQ(matched(seen(108, 20, 4)), 109) << "as close to the other view as a robot moves";
+}
+
 TEST(PlaceFilter, LikeliestAreDifferentPathsInOrder) {
   const Belief belief{{{10, {0.2}}, {14, {0.1, 0.05}}, {40, {0, 0.3}}, {90, {0.001}}}};
   EXPECT_EQ(PlaceFilter::likeliest(belief, 0.01, 5), (std::vector<std::ptrdiff_t>{40, 10}));

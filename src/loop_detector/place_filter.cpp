@@ -215,14 +215,29 @@ double PlaceFilter::rounded(double value) {
 std::optional<std::size_t> PlaceFilter::match_near(std::ptrdiff_t middle,
                                                    const std::vector<Observed>& observed,
                                                    const Belief& belief, const KnownLoops& loops) {
-  return best_of(
-      observed, [&](const Observed& o) { return is_near(o.step, middle, loops); },
+  const auto is_here = [&](const Observed& o) { return is_near(o.step, middle, loops); };
+  const auto shared = [&](const Observed& o) {
+    // One step may be more probable than the next by chance.
+    const double probability =
+        belief.at(o.step) + (belief.at(o.step - 1) + belief.at(o.step + 1)) / 2;
+    return std::pair(probability * o.num_votes, o.log_likelihood_ratio());
+  };
+  const auto match = best_of(observed, is_here, shared);
+  // A step may be probable by its path alone. Another view of the place is the match if both votes
+  // and inliers say so; among its steps, which look much alike, the path decides again.
+  const auto view = best_of(
+      observed,
       [&](const Observed& o) {
-        // One step may be more probable than the next by chance.
-        const double probability =
-            belief.at(o.step) + (belief.at(o.step - 1) + belief.at(o.step + 1)) / 2;
-        return std::pair(probability * o.num_votes, o.log_likelihood_ratio());
-      });
+        return is_here(o) && o.geometry > 0 && o.num_votes >= observed[*match].num_votes;
+      },
+      [](const Observed& o) { return rounded(o.geometry); });
+  if (!view) return match;
+  return best_of(
+      observed,
+      [&](const Observed& o) {
+        return is_here(o) && std::abs(o.step - observed[*view].step) <= kUsualMove;
+      },
+      shared);
 }
 
 Belief PlaceFilter::predict(bool is_step, const AgreementOfMoves& agreement) const {

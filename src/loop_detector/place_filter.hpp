@@ -77,7 +77,8 @@ class PlaceFilter {
   static bool is_near(std::ptrdiff_t a, std::ptrdiff_t b, const KnownLoops& loops);
 
   /// Of the candidates that show the place at `middle`, the one that is the match: it has most in
-  /// common with the frame, as far as it is probable.
+  /// common with the frame, as far as it is probable. Where both votes and inliers prefer another
+  /// view of the place, it is chosen there.
   static std::optional<std::size_t> match_near(std::ptrdiff_t middle,
                                                const std::vector<Observed>& observed,
                                                const Belief& belief, const KnownLoops& loops);
